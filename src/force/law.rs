@@ -1,0 +1,180 @@
+//! The traits of contact laws. A law sees one touch and its own memory and writes nowhere else;
+//! it must not know of lists, ranks or particles.
+//!
+//! Sign convention (PHYSICS.md section 1): contact (i, j), i the lower global id, normal n from i to
+//! j, overlap δ > 0 in contact. The force on i is `−F_n n + F_t`, on j the opposite; the moment on i
+//! beside the one of `F_t`'s arm is `+M`, on j `−M`.
+
+use super::lane::{Lane, Vector};
+
+/// Geometry and relative motion of one touch, at the full step.
+#[derive(Debug, Clone, Copy)]
+pub struct Touch<L> {
+    /// Overlap δ \[m\], > 0 (lanes that do not touch are blended away by the caller).
+    pub overlap: L,
+    /// δ̇ = −v_rel·n \[m/s\], positive while approaching.
+    pub overlap_rate: L,
+    /// Effective radius, 1/R_eff = 1/R_i + 1/R_j \[m\].
+    pub effective_radius: L,
+    /// Effective mass, 1/m_eff = 1/m_i + 1/m_j \[kg\].
+    pub effective_mass: L,
+    /// Unit normal n from i to j.
+    pub normal: Vector<L>,
+    /// Tangential part of the velocity of j relative to i at the contact point \[m/s\].
+    pub slip_velocity: Vector<L>,
+    /// Angular velocity of j relative to i, ω_j − ω_i \[rad/s\].
+    pub relative_spin: Vector<L>,
+    /// Mean angular velocity (ω_i + ω_j)/2 \[rad/s\].
+    pub mean_spin: Vector<L>,
+}
+
+/// Energies of one touch that the observing pass sums (the plain pass leaves them to the
+/// optimiser to delete).
+#[derive(Debug, Clone, Copy)]
+pub struct Energies<L> {
+    /// Energy held by springs now \[J\].
+    pub elastic: L,
+    /// Energy held by Maxwell branches now \[J\].
+    pub viscoelastic: L,
+    /// Dissipated in this step by dashpots (with the part that clipping takes out) \[J\].
+    pub damping: L,
+    /// Dissipated in this step by Maxwell branches \[J\].
+    pub viscous: L,
+    /// Dissipated in this step by sliding, rolling and twisting slip \[J\].
+    pub friction: L,
+    /// Dissipated in this step by plastic deformation \[J\].
+    pub plastic: L,
+}
+
+impl<L: Lane> Energies<L> {
+    /// All zero.
+    #[inline(always)]
+    #[must_use]
+    pub fn zero() -> Self {
+        let z = L::splat(0.0);
+        Self { elastic: z, viscoelastic: z, damping: z, viscous: z, friction: z, plastic: z }
+    }
+    /// Sum, entry by entry.
+    #[inline(always)]
+    #[must_use]
+    pub fn plus(self, o: Self) -> Self {
+        Self {
+            elastic: self.elastic + o.elastic,
+            viscoelastic: self.viscoelastic + o.viscoelastic,
+            damping: self.damping + o.damping,
+            viscous: self.viscous + o.viscous,
+            friction: self.friction + o.friction,
+            plastic: self.plastic + o.plastic,
+        }
+    }
+}
+
+/// What a normal law returns.
+#[derive(Debug, Clone, Copy)]
+pub struct NormalResponse<L> {
+    /// Normal force F_n \[N\], compression positive, after clipping.
+    pub force: L,
+    /// Radius a of the contact circle \[m\].
+    pub contact_radius: L,
+    /// Tangent stiffness ∂F/∂δ at spontaneous response \[N/m\] (time step).
+    pub stiffness: L,
+    /// Dashpot coefficient c of c·δ̇ \[N s/m\] (for a tangential dashpot of the same kind).
+    pub dashpot: L,
+    /// Energies of the normal part.
+    pub energies: Energies<L>,
+}
+
+/// What a tangential or rolling law returns.
+#[derive(Debug, Clone, Copy)]
+pub struct VectorResponse<L> {
+    /// Tangential: force F_t on i \[N\]. Rolling and twisting: moment M on i \[N m\].
+    pub value: Vector<L>,
+    /// Energies of this part.
+    pub energies: Energies<L>,
+}
+
+/// One memory column of a law.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Name, for example `overlap` or `tangential_force_x`.
+    pub name: String,
+    /// SI unit, for example `m`.
+    pub unit: &'static str,
+}
+
+/// A normal force law.
+pub trait NormalLaw: Copy + Send + Sync + 'static {
+    /// Number of memory columns.
+    const MEMORY: usize;
+    /// Names and units of the memory columns, `MEMORY` of them.
+    fn columns(&self) -> Vec<Column>;
+    /// Recompute what depends on the time step \[s\].
+    fn prepare(&mut self, time_step: f64);
+    /// Force of one touch; `memory` has `MEMORY` entries, all zero at first touch.
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
+}
+
+/// A tangential force law.
+pub trait TangentialLaw: Copy + Send + Sync + 'static {
+    /// Number of memory columns.
+    const MEMORY: usize;
+    /// Names and units of the memory columns.
+    fn columns(&self) -> Vec<Column>;
+    /// Recompute what depends on the time step \[s\].
+    fn prepare(&mut self, time_step: f64);
+    /// Force of one touch.
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
+}
+
+/// A rolling and twisting resistance law.
+pub trait RollingLaw: Copy + Send + Sync + 'static {
+    /// Number of memory columns.
+    const MEMORY: usize;
+    /// Names and units of the memory columns.
+    fn columns(&self) -> Vec<Column>;
+    /// Recompute what depends on the time step \[s\].
+    fn prepare(&mut self, time_step: f64);
+    /// Moment of one touch.
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
+}
+
+/// What a whole contact (normal, tangential, rolling) returns to the pass.
+#[derive(Debug, Clone, Copy)]
+pub struct ContactResponse<L> {
+    /// Normal force F_n \[N\], compression positive.
+    pub normal_force: L,
+    /// Tangential force on i \[N\].
+    pub tangential_force: Vector<L>,
+    /// Moment on i beside the arm's \[N m\].
+    pub moment: Vector<L>,
+    /// Tangent stiffness \[N/m\].
+    pub stiffness: L,
+    /// Sum of the parts' energies.
+    pub energies: Energies<L>,
+}
+
+/// The complete law of a pair of materials, as the pass sees it. Implemented once, by
+/// [`super::composition::Composition`].
+pub trait ContactLaw: Copy + Send + Sync + 'static {
+    /// Number of memory columns.
+    const MEMORY: usize;
+    /// Has a tangential force (torques from the arm, spins needed).
+    const TANGENTIAL: bool;
+    /// Has rolling or twisting moments.
+    const ROLLING: bool;
+    /// Names and units of the memory columns.
+    fn columns(&self) -> Vec<Column>;
+    /// Recompute what depends on the time step \[s\].
+    fn prepare(&mut self, time_step: f64);
+    /// Forces of one touch; `memory` has `MEMORY` entries.
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L>;
+}
+
+/// Runs the monomorphised loop for a law chosen at run time: the registry calls `visit` once with the
+/// concrete composition.
+pub trait LawVisitor {
+    /// What the visitor makes of the law.
+    type Output;
+    /// Called with the concrete composition.
+    fn visit<C: ContactLaw>(self, law: C) -> Self::Output;
+}

@@ -1,0 +1,157 @@
+//! What contact laws exist: names, parameters, memory, how each is built. One line per law.
+
+use crate::config::MaxwellBranch;
+
+/// Kind and range of a law's parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParameterKind {
+    /// A dimensionless number in \[min, max\].
+    Number {
+        /// Smallest allowed value.
+        min: f64,
+        /// Largest allowed value.
+        max: f64,
+    },
+    /// One of these words.
+    Choice(&'static [&'static str]),
+    /// true or false.
+    Flag,
+}
+
+/// Value of a law's parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParameterValue {
+    /// For [`ParameterKind::Number`].
+    Number(f64),
+    /// For [`ParameterKind::Choice`]: index into the words.
+    Choice(usize),
+    /// For [`ParameterKind::Flag`].
+    Flag(bool),
+}
+
+/// A parameter that a law reads from its own section of the input.
+#[derive(Debug, Clone, Copy)]
+pub struct ParameterSpec {
+    /// Key in the input.
+    pub name: &'static str,
+    /// Kind and range.
+    pub kind: ParameterKind,
+    /// Value when the key is absent.
+    pub default: ParameterValue,
+    /// One line for the documentation and the commented example.
+    pub doc: &'static str,
+}
+
+/// Which of the three parts of a contact a law describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Normal force.
+    Normal,
+    /// Tangential force.
+    Tangential,
+    /// Rolling and twisting moments.
+    Rolling,
+}
+
+/// A law as the input and the documentation see it.
+#[derive(Debug, Clone, Copy)]
+pub struct LawEntry {
+    /// Key in the input, for example `hertz`.
+    pub name: &'static str,
+    /// Which part of the contact.
+    pub role: Role,
+    /// One line for the documentation.
+    pub summary: &'static str,
+    /// Paper key and equation.
+    pub source: &'static str,
+    /// Parameters in the order of [`LawChoice::values`].
+    pub parameters: &'static [ParameterSpec],
+    /// Checks the pair's properties; an error text says what is missing and the remedy.
+    pub check: fn(&PairProperties) -> Result<(), String>,
+}
+
+/// A law chosen in the input with its parameters.
+#[derive(Debug, Clone)]
+pub struct LawChoice {
+    /// The law.
+    pub law: &'static LawEntry,
+    /// One value per entry of `law.parameters`.
+    pub values: Vec<ParameterValue>,
+}
+
+impl LawChoice {
+    /// Value of a number parameter; panics on a name that the law does not declare (our own bug).
+    #[must_use]
+    pub fn number(&self, name: &str) -> f64 {
+        match self.value(name) {
+            ParameterValue::Number(v) => v,
+            other => panic!("parameter {name} of {} is {other:?}, not a number", self.law.name),
+        }
+    }
+    /// Value of a choice parameter as its word.
+    #[must_use]
+    pub fn word(&self, name: &str) -> &'static str {
+        let index = self.index(name);
+        match (self.law.parameters[index].kind, self.values[index]) {
+            (ParameterKind::Choice(words), ParameterValue::Choice(i)) => words[i],
+            (_, other) => panic!("parameter {name} of {} is {other:?}, not a choice", self.law.name),
+        }
+    }
+    /// Value of a flag parameter.
+    #[must_use]
+    pub fn flag(&self, name: &str) -> bool {
+        match self.value(name) {
+            ParameterValue::Flag(v) => v,
+            other => panic!("parameter {name} of {} is {other:?}, not a flag", self.law.name),
+        }
+    }
+    fn index(&self, name: &str) -> usize {
+        self.law
+            .parameters
+            .iter()
+            .position(|p| p.name == name)
+            .unwrap_or_else(|| panic!("law {} declares no parameter {name}", self.law.name))
+    }
+    fn value(&self, name: &str) -> ParameterValue {
+        self.values[self.index(name)]
+    }
+}
+
+/// Constants of a pair of materials that laws read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairProperties {
+    /// Names of the two materials.
+    pub names: [String; 2],
+    /// Young's moduli \[Pa\] (long-term with Maxwell branches).
+    pub young_modulus: [f64; 2],
+    /// Poisson's ratios.
+    pub poisson_ratio: [f64; 2],
+    /// Maxwell branches of each material.
+    pub maxwell: [Vec<MaxwellBranch>; 2],
+    /// Yield stresses \[Pa\].
+    pub yield_stress: [Option<f64>; 2],
+    /// Restitution coefficient of the pair.
+    pub restitution: f64,
+    /// Coulomb friction coefficient of the pair.
+    pub friction: f64,
+    /// Rolling friction coefficient of the pair.
+    pub rolling_friction: f64,
+    /// Twisting friction coefficient of the pair.
+    pub twisting_friction: f64,
+}
+
+impl PairProperties {
+    /// `1/E_eff = (1−ν_i²)/E_i + (1−ν_j²)/E_j` \[Pa\] (W 3.2).
+    #[must_use]
+    pub fn effective_young_modulus(&self) -> f64 {
+        let [a, b] = [0, 1].map(|k| (1.0 - self.poisson_ratio[k] * self.poisson_ratio[k]) / self.young_modulus[k]);
+        1.0 / (a + b)
+    }
+    /// `1/G_eff = Σ 2(2−ν)(1+ν)/E` \[Pa\] (W 3.9 with the erratum of PHYSICS.md section 1).
+    #[must_use]
+    pub fn effective_shear_modulus(&self) -> f64 {
+        let [a, b] =
+            [0, 1].map(|k| 2.0 * (2.0 - self.poisson_ratio[k]) * (1.0 + self.poisson_ratio[k]) / self.young_modulus[k]);
+        1.0 / (a + b)
+    }
+}

@@ -1,0 +1,11 @@
+//! dem-mpi: the discrete element method for battery electrodes and granular matter, parallel over
+//! MPI ranks and threads, with the same bits on every machine shape. See `ARCHITECTURE.md`.
+
+pub mod config;
+pub mod error;
+pub mod exchange;
+pub mod force;
+pub mod output;
+pub mod packing;
+pub mod state;
+pub mod units;

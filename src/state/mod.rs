@@ -1,0 +1,123 @@
+//! What a particle and a contact are: the data that migration, checkpoint and digest carry.
+
+pub mod particles;
+
+use bytemuck::{Pod, Zeroable};
+
+/// Everything that one particle is, as it travels between ranks and into checkpoints.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct ParticleState {
+    /// Global id, 0 … N−1.
+    pub id: u32,
+    /// Index into [`crate::config::Config::species`].
+    pub species: u32,
+    /// Position, wrapped into the cell \[m\].
+    pub position: [f64; 3],
+    /// Radius \[m\].
+    pub radius: f64,
+    /// Velocity at the last half step \[m/s\].
+    pub velocity: [f64; 3],
+    /// Acceleration at the last full step \[m/s²\].
+    pub acceleration: [f64; 3],
+    /// Angular velocity at the last half step \[rad/s\].
+    pub spin: [f64; 3],
+    /// Angular acceleration at the last full step \[rad/s²\].
+    pub angular_acceleration: [f64; 3],
+    /// Orientation, unit quaternion (w, x, y, z).
+    pub orientation: [f64; 4],
+    /// Energy ledger of this particle \[J\], see [`LEDGER`]; zero when the ledger is off.
+    pub ledger: [f64; LEDGER.len()],
+    /// Periodic images crossed since the start, per axis.
+    pub image: [i32; 3],
+    /// Keeps the layout free of hidden padding; zero.
+    pub reserved: i32,
+}
+
+/// Names of the entries of [`ParticleState::ledger`]: energy put in by the cell, by gravity and by
+/// driven particles or walls, and energy dissipated by each cause \[J\].
+pub const LEDGER: [&str; 7] = ["work_cell", "work_body", "work_driven", "damping", "viscous", "friction", "plastic"];
+
+/// Identity of a contact: the pair of global ids, low first, and the integer image shift S of the
+/// high one, d = x_high + S·L − x_low. Walls have ids N, N+1, … and shift 0. For own-image contacts
+/// `low == high` and S is lexicographically positive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
+#[repr(C)]
+pub struct ContactKey {
+    /// Lower global id.
+    pub low: u32,
+    /// Higher global id.
+    pub high: u32,
+    /// Image shift; the fourth entry is zero.
+    pub shift: [i32; 4],
+}
+
+/// Contact memory apart from any list: keys and rows of equal width (the widest law's; narrower
+/// ones leave trailing zeros).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ContactMemory {
+    /// Identity of each row.
+    pub keys: Vec<ContactKey>,
+    /// Numbers per row.
+    pub width: usize,
+    /// Row-major values, `keys.len() × width`.
+    pub values: Vec<f64>,
+}
+
+impl ContactMemory {
+    /// An empty store with this row width.
+    #[must_use]
+    pub fn new(width: usize) -> Self {
+        Self { keys: Vec::new(), width, values: Vec::new() }
+    }
+
+    /// Append one row.
+    pub fn push(&mut self, key: ContactKey, row: &[f64]) {
+        debug_assert_eq!(row.len(), self.width);
+        self.keys.push(key);
+        self.values.extend_from_slice(row);
+    }
+
+    /// Row `index`.
+    #[must_use]
+    pub fn row(&self, index: usize) -> &[f64] {
+        &self.values[index * self.width..(index + 1) * self.width]
+    }
+}
+
+/// Global state beside particles and contacts; part of checkpoint and digest. JSON in the checkpoint.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct GlobalState {
+    /// Steps done.
+    pub step: u64,
+    /// Time \[s\].
+    pub time: f64,
+    /// Current time step \[s\].
+    pub time_step: f64,
+    /// Time step of the previous step \[s\] (leap-frog with changing Δt needs both).
+    pub previous_time_step: f64,
+    /// Cell sides at time 0 \[m\].
+    pub initial_sides: [f64; 3],
+    /// Cell sides \[m\].
+    pub sides: [f64; 3],
+    /// Nominal strain per axis, compression positive.
+    pub strain: [f64; 3],
+    /// Strain rate in force per axis \[1/s\].
+    pub strain_rate: [f64; 3],
+    /// Index of the current stage.
+    pub stage: usize,
+    /// Time at which the current stage began \[s\].
+    pub stage_start_time: f64,
+    /// Strain at which the current stage began.
+    pub stage_start_strain: [f64; 3],
+    /// Step at which the current stage began.
+    pub stage_start_step: u64,
+    /// Number of history rows written.
+    pub history_rows: u64,
+    /// Number of snapshots written.
+    pub snapshots: u64,
+    /// Last measured stress per axis \[Pa\] (servo and end conditions).
+    pub measured_stress: [f64; 3],
+    /// Number of particles.
+    pub particles: u64,
+}

@@ -1,0 +1,1 @@
+//! Physical dimensions and quantities with units, as they stand in input files.
