@@ -1,1 +1,3 @@
+//! The program: see `dem-mpi --help`.
+
 fn main() {}

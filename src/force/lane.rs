@@ -26,10 +26,13 @@ pub trait Lane:
     /// Write the lanes to the first `WIDTH` places of a slice.
     fn store(self, values: &mut [f64]);
     /// Square root.
+    #[must_use]
     fn sqrt(self) -> Self;
     /// `if self > other { self } else { other }`.
+    #[must_use]
     fn max(self, other: Self) -> Self;
     /// `if self < other { self } else { other }`.
+    #[must_use]
     fn min(self, other: Self) -> Self;
     /// `self < other`.
     fn less(self, other: Self) -> Self::Mask;
