@@ -148,7 +148,7 @@ pub(crate) mod tests {
         other[3].velocity[1] = f64::from_bits(other[3].velocity[1].to_bits() ^ 1);
         assert_ne!(first, digest(&comm, &global, &other, &memory));
         let mut other = memory.clone();
-        other.values[5] = -1.0;
+        other.values[5] += 8.0;
         assert_ne!(first, digest(&comm, &global, &particles, &other));
         let other = GlobalState { time: 0.3, ..global.clone() };
         assert_ne!(first, digest(&comm, &other, &particles, &memory));
