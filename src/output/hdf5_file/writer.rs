@@ -55,6 +55,12 @@ impl Writer {
         }
     }
 
+    /// This is rank 0, which also writes what belongs to no rank's rows.
+    #[must_use]
+    pub fn is_first_rank(&self) -> bool {
+        self.comm.rank() == 0
+    }
+
     /// Write this rank's rows of a dataset, beginning at row `start`. Collective, in the same order of
     /// datasets on all ranks; a rank may have no rows.
     ///
