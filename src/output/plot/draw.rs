@@ -18,6 +18,8 @@ pub struct Curve {
 }
 
 const SIZE: (u32, u32) = (1200, 800);
+/// Pixels of a PNG per unit of [`SIZE`]: lines have whole-pixel corners, which show at one.
+const PNG_SCALE: u32 = 2;
 const FONT: &str = "sans-serif";
 /// Distinct also for colour-blind readers (Okabe and Ito, Color Universal Design, 2008).
 const COLOURS: [RGBColor; 8] = [
@@ -42,8 +44,11 @@ pub fn draw_curves(path: &Path, title: &str, x_label: &str, y_label: &str, curve
     let bounds = Bounds::of(curves).ok_or_else(|| fault("no finite point to draw".to_owned()))?;
     let labels = [title, x_label, y_label];
     let drawn = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("svg") => chart(SVGBackend::new(path, SIZE).into_drawing_area(), labels, &bounds, curves),
-        Some("png") => chart(BitMapBackend::new(path, SIZE).into_drawing_area(), labels, &bounds, curves),
+        Some("svg") => chart(SVGBackend::new(path, SIZE).into_drawing_area(), 1, labels, &bounds, curves),
+        Some("png") => {
+            let size = (SIZE.0 * PNG_SCALE, SIZE.1 * PNG_SCALE);
+            chart(BitMapBackend::new(path, size).into_drawing_area(), PNG_SCALE, labels, &bounds, curves)
+        }
         _ => Err("pictures end in .svg or .png".to_owned()),
     };
     drawn.map_err(|reason| fault(format!("cannot draw the picture: {reason}")))
@@ -51,10 +56,7 @@ pub fn draw_curves(path: &Path, title: &str, x_label: &str, y_label: &str, curve
 
 fn provide_font() -> std::result::Result<(), ()> {
     static REGISTERED: OnceLock<std::result::Result<(), ()>> = OnceLock::new();
-    *REGISTERED.get_or_init(|| {
-        register_font(FONT, FontStyle::Normal, ttf_noto_sans::REGULAR).map_err(|_| ())?;
-        register_font(FONT, FontStyle::Bold, ttf_noto_sans::BOLD).map_err(|_| ())
-    })
+    *REGISTERED.get_or_init(|| register_font(FONT, FontStyle::Normal, ttf_noto_sans::REGULAR).map_err(|_| ()))
 }
 
 /// What the axes show, with a margin around the data.
@@ -88,18 +90,20 @@ fn widened([low, high]: [f64; 2], share: f64) -> [f64; 2] {
 
 fn chart<B: DrawingBackend>(
     area: DrawingArea<B, Shift>,
+    scale: u32,
     [title, x_label, y_label]: [&str; 3],
     bounds: &Bounds,
     curves: &[Curve],
 ) -> std::result::Result<(), String> {
     let text = |error: DrawingAreaErrorKind<B::ErrorType>| error.to_string();
+    let size = |units: u32| units * scale;
     area.fill(&WHITE).map_err(text)?;
     let mut chart = ChartBuilder::on(&area)
-        .caption(title, (FONT, 34).into_font().style(FontStyle::Bold))
-        .margin(24)
-        .margin_right(40)
-        .x_label_area_size(72)
-        .y_label_area_size(110)
+        .caption(title, (FONT, size(34)))
+        .margin(size(24))
+        .margin_right(size(40))
+        .x_label_area_size(size(72))
+        .y_label_area_size(size(110))
         .build_cartesian_2d(bounds.x[0]..bounds.x[1], bounds.y[0]..bounds.y[1])
         .map_err(text)?;
     let (x_digits, y_digits) = (tick_digits(bounds.x), tick_digits(bounds.y));
@@ -111,29 +115,30 @@ fn chart<B: DrawingBackend>(
         .y_labels(8)
         .x_label_formatter(&|value| tick(*value, x_digits))
         .y_label_formatter(&|value| tick(*value, y_digits))
-        .label_style((FONT, 22))
-        .axis_desc_style((FONT, 26))
+        .label_style((FONT, size(22)))
+        .axis_desc_style((FONT, size(26)))
         .bold_line_style(RGBColor(215, 215, 215))
         .light_line_style(WHITE)
         .draw()
         .map_err(text)?;
     for (index, curve) in curves.iter().enumerate() {
         let colour = COLOURS[index % COLOURS.len()];
-        let style = colour.stroke_width(3);
+        let style = colour.stroke_width(size(3));
         let mut label = Some(curve.label.as_str());
         for run in curve.points.split(|point| !finite(point)).filter(|run| !run.is_empty()) {
             let series = chart.draw_series(LineSeries::new(run.iter().copied(), style)).map_err(text)?;
             if let Some(label) = label.take() {
-                series.label(label).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 34, y)], style));
+                let length = size(34) as i32;
+                series.label(label).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + length, y)], style));
             }
         }
     }
     chart
         .configure_series_labels()
         .position(legend_position(bounds, curves))
-        .label_font((FONT, 22))
-        .legend_area_size(44)
-        .margin(16)
+        .label_font((FONT, size(22)))
+        .legend_area_size(size(44))
+        .margin(size(16))
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(180, 180, 180))
         .draw()
