@@ -1,3 +1,5 @@
-//! The program: see `dem-mpi --help`.
+//! The `dem-mpi` command.
 
-fn main() {}
+fn main() {
+    std::process::exit(dem_mpi::cli::main());
+}

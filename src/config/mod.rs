@@ -1,5 +1,21 @@
-//! The checked input in SI units: what every later stage reads. Built by `check` from a TOML file;
+//! The checked input in SI units: what every later stage reads. Built by [`load`] from a TOML file;
 //! knows nothing of ranks or of the simulation's state.
+
+mod build;
+mod contact;
+mod diagnostic;
+mod document;
+pub mod keys;
+mod particles;
+mod programme;
+mod radius;
+mod resolved;
+pub mod schema;
+mod section;
+mod settings;
+mod stages;
+
+pub use build::load;
 
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;

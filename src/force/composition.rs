@@ -160,3 +160,6 @@ impl<N: NormalLaw, T: TangentialLaw, V: LawVisitor> RollingVisitor for FromRolli
         self.visitor.visit(Composition { normal: self.normal, tangential: self.tangential, rolling })
     }
 }
+
+#[cfg(test)]
+mod tests;

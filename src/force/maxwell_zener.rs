@@ -216,3 +216,6 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,11 +3,14 @@
 pub mod composition;
 pub mod dashpot;
 mod documentation;
+pub mod geometry;
 pub mod hertz;
 pub mod lane;
 pub mod law;
 pub mod maxwell_zener;
 pub mod mindlin;
+pub mod observe;
+pub mod pass;
 pub mod registry;
 pub mod rolling;
 pub mod shear;

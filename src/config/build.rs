@@ -1,0 +1,115 @@
+//! From text to the checked [`Config`]: the order in which the input is read.
+
+use super::diagnostic::{Problem, Source, render};
+use super::section::{Reader, Section};
+use super::{Config, contact, document, keys, particles, settings, stages};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Read and check the input file at `path`.
+///
+/// `overrides` are `key=value` texts from `--set`, with dotted keys and list entries by number
+/// (`stage.0.duration=2 s`); `output` and `threads` come from the command line and outdo the file.
+///
+/// # Errors
+/// [`Error::File`] if the file cannot be read, [`Error::Input`] with every problem found in it.
+pub fn load(path: &Path, overrides: &[String], output: Option<&Path>, threads: Option<usize>) -> Result<Config> {
+    let text = std::fs::read_to_string(path).map_err(|error| Error::File {
+        path: path.to_owned(),
+        message: format!("the input cannot be read ({error}); check the path, or make one with `dem-mpi init`"),
+    })?;
+    Config::parse(&text, path, overrides, output, threads)
+}
+
+impl Config {
+    /// Read and check an input text; `file` names it in messages, in the title and in the default run
+    /// directory, and paths in the text are relative to its folder. The rest is as for [`load`].
+    ///
+    /// # Errors
+    /// [`Error::Input`] with every problem found.
+    pub fn parse(
+        text: &str,
+        file: &Path,
+        overrides: &[String],
+        output: Option<&Path>,
+        threads: Option<usize>,
+    ) -> Result<Self> {
+        let mut sources = vec![Source { name: file.display().to_string(), text: text.to_owned() }];
+        let mut problems = Vec::new();
+        let mut root = document::parse(text, &mut problems);
+        if !problems.is_empty() {
+            return Err(Error::Input(render(&sources, problems)));
+        }
+        for argument in overrides {
+            document::set(&mut root, &mut sources, argument, &mut problems);
+        }
+        if let Some(directory) = output {
+            let value = document::Value::Text(directory.to_string_lossy().into_owned());
+            document::put(&mut root, &mut sources, "command line, --output", "output.directory", value, &mut problems);
+        }
+        if let Some(count) = threads {
+            let value = document::Value::Integer(i64::try_from(count).unwrap_or(i64::MAX));
+            document::put(&mut root, &mut sources, "command line, --threads", "parallel.threads", value, &mut problems);
+        }
+        let reader = Reader::default();
+        let config = read(&Section::root(&reader, &root, &keys::ROOT), file);
+        problems.extend(reader.problems.into_inner());
+        match config {
+            Some(config) if problems.is_empty() => Ok(Self { resolved: reader.resolved.into_inner().text(), ..config }),
+            _ => Err(Error::Input(render(&sources, checked(problems)))),
+        }
+    }
+}
+
+/// A reader that gives up must have said why.
+fn checked(problems: Vec<Problem>) -> Vec<Problem> {
+    debug_assert!(!problems.is_empty(), "the input was refused without a reason");
+    problems
+}
+
+fn read(root: &Section, file: &Path) -> Option<Config> {
+    let stem = file.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let title = root.text_or("title", &stem);
+    let seed = root.integer("seed");
+    let gravity = root.axes("gravity");
+    let (names, materials) = particles::read_materials(root);
+    let cell = settings::read_cell(root, &names);
+    let packing = settings::read_packing(root, folder);
+    let from_file = root.chooses("packing", "file");
+    let species = particles::read_species(root, &names, from_file);
+    let context = contact::Context {
+        names: &names,
+        materials: materials.as_deref(),
+        species: species.as_deref(),
+        cell: cell.as_ref(),
+    };
+    let pairs = contact::read(root, &context);
+    let load = stages::read_load(root);
+    let stages = stages::read(root, cell.as_ref());
+    let time_step = settings::read_time_step(root);
+    let output = settings::read_output(root, &stem);
+    let parallel = settings::read_parallel(root);
+    let (cell, packing, species) = (cell?, packing?, species?);
+    settings::check_cell(root, &cell, &packing, &species);
+    let (pairs, max_overlap_fraction) = pairs?;
+    let (kinematics, control_interval) = load?;
+    Some(Config {
+        seed: seed?,
+        cell,
+        materials: materials?,
+        species,
+        pairs,
+        packing,
+        gravity: gravity?,
+        kinematics,
+        stages: stages?,
+        time_step: time_step?,
+        control_interval,
+        max_overlap_fraction,
+        output: output?,
+        parallel: parallel?,
+        title: title?,
+        resolved: String::new(),
+    })
+}

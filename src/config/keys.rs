@@ -1,0 +1,502 @@
+//! Every section and key of the input.
+
+use super::schema::{Default, Key, Kind, Range, Table, key};
+use crate::force::registry::Role;
+use crate::units::Dimension;
+
+use Default::{Absent, Derived, Required};
+
+const fn number(dimension: Dimension, range: Range) -> Kind {
+    Kind::Number(dimension, range)
+}
+
+const fn axes(dimension: Dimension, uniform: bool) -> Kind {
+    Kind::Axes { dimension, range: Range::ANY, uniform }
+}
+
+const COEFFICIENT: Kind = number(Dimension::NONE, Range::NOT_NEGATIVE);
+const LENGTH: Kind = number(Dimension::LENGTH, Range::POSITIVE);
+const ZERO: Default = Default::Number(0.0);
+
+/// The top level.
+pub static ROOT: Table = Table {
+    meaning: "The run as a whole.",
+    keys: &[
+        key("title", Kind::Text, Derived("name of the file"), "Name of the run in titles and plots."),
+        key(
+            "seed",
+            Kind::Integer(0),
+            Default::Integer(1),
+            "Seed of every random draw: packing, radii, initial velocities.",
+        ),
+        key(
+            "particles",
+            Kind::Integer(1),
+            Absent,
+            "Number of particles of all species together; needed where species give a `fraction`.",
+        ),
+        key("gravity", axes(Dimension::ACCELERATION, false), ZERO, "Uniform body acceleration."),
+        key("cell", Kind::Table(&CELL), Derived("all its defaults"), "The cell."),
+        key("material", Kind::List(&MATERIAL), Required, "Materials."),
+        key("species", Kind::List(&SPECIES), Required, "Particle species."),
+        key("contact", Kind::Table(&CONTACT), Required, "Contact laws of every pair of materials."),
+        key("pair", Kind::List(&PAIR), Absent, "What a named pair of materials does differently."),
+        key(
+            "packing",
+            Kind::OneOf(&PACKING, None),
+            Default::Word("random_close"),
+            "How the initial positions are made.",
+        ),
+        key("load", Kind::Table(&LOAD), Derived("all its defaults"), "What all stages share."),
+        key("stage", Kind::List(&STAGE), Required, "The load programme, one stage after the other."),
+        key("time_step", Kind::OneOf(&TIME_STEP, Some("fixed")), Default::Word("automatic"), "The time step."),
+        key("output", Kind::Table(&OUTPUT), Derived("all its defaults"), "What is written, and how often."),
+        key(
+            "parallel",
+            Kind::Table(&PARALLEL),
+            Derived("all its defaults"),
+            "Ranks, threads, lists; no effect on results.",
+        ),
+    ],
+};
+
+/// `[cell]`.
+pub static CELL: Table = Table {
+    meaning: "A box with its low corner at the origin. Give `sides`, or `solid_fraction`, or neither \
+              (random close packing then sizes the box by where it jams).",
+    keys: &[
+        key(
+            "sides",
+            Kind::Axes { dimension: Dimension::LENGTH, range: Range::POSITIVE, uniform: true },
+            Absent,
+            "Sides of the box.",
+        ),
+        key(
+            "solid_fraction",
+            number(Dimension::NONE, Range::between(0.0, 1.0)),
+            Absent,
+            "Volume of the particles over volume of the box; sizes the box.",
+        ),
+        key(
+            "aspect",
+            Kind::Axes { dimension: Dimension::NONE, range: Range::POSITIVE, uniform: false },
+            Default::Number(1.0),
+            "Proportions of a box that is sized by its solid fraction.",
+        ),
+        key(
+            "boundary",
+            Kind::AxisWords(&["periodic", "walls"]),
+            Default::Word("periodic"),
+            "Periodic, or plane walls at both faces, per axis.",
+        ),
+        key("wall_material", Kind::AxisWords(&[]), Absent, "Material of the walls; needed for each walled axis."),
+    ],
+};
+
+/// `[[material]]`.
+pub static MATERIAL: Table = Table {
+    meaning: "A material.",
+    keys: &[
+        key("name", Kind::Text, Required, "Name that species, walls and pairs refer to."),
+        key("density", number(Dimension::DENSITY, Range::POSITIVE), Required, "Physical density."),
+        key(
+            "density_scaling",
+            number(Dimension::NONE, Range::POSITIVE),
+            Default::Number(1.0),
+            "Factor on the density: larger time steps, more inertia (see the pre-run sheet).",
+        ),
+        key(
+            "young_modulus",
+            number(Dimension::PRESSURE, Range::POSITIVE),
+            Required,
+            "Young's modulus; with Maxwell branches the long-term one.",
+        ),
+        key("poisson_ratio", number(Dimension::NONE, Range::between(-1.0, 0.5)), Required, "Poisson's ratio."),
+        key("maxwell", Kind::List(&MAXWELL), Absent, "Maxwell branches, parallel to the long-term spring."),
+        key("yield_stress", number(Dimension::PRESSURE, Range::POSITIVE), Absent, "Yield stress."),
+        key("friction", COEFFICIENT, ZERO, "Coulomb friction coefficient; needs a tangential law."),
+        key(
+            "restitution",
+            number(Dimension::NONE, Range::FRACTION),
+            Default::Number(1.0),
+            "Coefficient of restitution; 1: no dashpot.",
+        ),
+        key("rolling_friction", COEFFICIENT, ZERO, "Rolling friction coefficient; needs a rolling law."),
+        key("twisting_friction", COEFFICIENT, ZERO, "Twisting friction coefficient; needs a rolling law."),
+    ],
+};
+
+/// `[[material.maxwell]]`.
+pub static MAXWELL: Table = Table {
+    meaning: "A spring and a dashpot in series. Give `relaxation_time` or `viscosity`.",
+    keys: &[
+        key("modulus", number(Dimension::PRESSURE, Range::POSITIVE), Required, "Modulus of the spring."),
+        key(
+            "relaxation_time",
+            number(Dimension::TIME, Range::POSITIVE),
+            Absent,
+            "Time in which the branch relaxes to 1/e.",
+        ),
+        key(
+            "viscosity",
+            number(Dimension::VISCOSITY, Range::POSITIVE),
+            Absent,
+            "Viscosity of the dashpot; relaxation time = viscosity / modulus.",
+        ),
+    ],
+};
+
+/// `[[species]]`.
+pub static SPECIES: Table = Table {
+    meaning: "A kind of particle. With random close packing give `count`, or `fraction` and the top-level `particles`.",
+    keys: &[
+        key("name", Kind::Text, Required, "Name, as in a particle file."),
+        key("material", Kind::Text, Required, "Name of its material."),
+        key("radius", Kind::OneOf(&RADIUS, Some("fixed")), Required, "Radius or distribution of radii."),
+        key("count", Kind::Integer(1), Absent, "Number of particles."),
+        key("fraction", number(Dimension::NONE, Range::FRACTION), Absent, "Share of all particles, by number."),
+        key("motion", Kind::OneOf(&MOTION, None), Default::Word("free"), "What moves it."),
+        key("velocity", axes(Dimension::VELOCITY, false), ZERO, "Initial velocity."),
+        key(
+            "velocity_deviation",
+            number(Dimension::VELOCITY, Range::NOT_NEGATIVE),
+            ZERO,
+            "Standard deviation of a random normal part of each velocity component.",
+        ),
+        key("spin", axes(Dimension::RATE, false), ZERO, "Initial angular velocity."),
+    ],
+};
+
+/// `[species.radius]`.
+pub static RADIUS: Table = Table {
+    meaning: "Distribution of radii, by number. A plain value is the fixed radius.",
+    keys: &[
+        key("fixed", LENGTH, Absent, "All equal."),
+        key("normal", Kind::Table(&NORMAL), Absent, "Normal distribution, cut."),
+        key("lognormal", Kind::Table(&LOGNORMAL), Absent, "Lognormal distribution, cut."),
+        key("tabulated", Kind::Table(&TABULATED), Absent, "Some radii with weights."),
+    ],
+};
+
+static NORMAL: Table = Table {
+    meaning: "Normal distribution of radii.",
+    keys: &[
+        key("mean", LENGTH, Required, "Mean before the cut."),
+        key("deviation", LENGTH, Required, "Standard deviation before the cut."),
+        key("min", LENGTH, Derived("mean - 3 deviation"), "Smallest radius."),
+        key("max", LENGTH, Derived("mean + 3 deviation"), "Largest radius."),
+    ],
+};
+
+static LOGNORMAL: Table = Table {
+    meaning: "Lognormal distribution of radii.",
+    keys: &[
+        key("median", LENGTH, Required, "Median before the cut."),
+        key("sigma", number(Dimension::NONE, Range::POSITIVE), Required, "Standard deviation of ln R."),
+        key("min", LENGTH, Derived("median · exp(-3 sigma)"), "Smallest radius."),
+        key("max", LENGTH, Derived("median · exp(3 sigma)"), "Largest radius."),
+    ],
+};
+
+static TABULATED: Table = Table {
+    meaning: "Radii with weights, two lists of one length.",
+    keys: &[
+        key("radius", Kind::Numbers(Dimension::LENGTH, Range::POSITIVE), Required, "Radii."),
+        key(
+            "weight",
+            Kind::Numbers(Dimension::NONE, Range::NOT_NEGATIVE),
+            Required,
+            "Weights by number, any sum above 0.",
+        ),
+    ],
+};
+
+static NOTHING: Table = Table { meaning: "Has no keys.", keys: &[] };
+
+/// `[species.motion]`.
+pub static MOTION: Table = Table {
+    meaning: "What moves the particles of a species.",
+    keys: &[
+        key("free", Kind::Table(&NOTHING), Absent, "Forces."),
+        key("fixed", Kind::Table(&NOTHING), Absent, "Nothing; it stays where it is."),
+        key("driven", Kind::Table(&DRIVEN), Absent, "A prescribed motion, whatever the forces."),
+    ],
+};
+
+static DRIVEN: Table = Table {
+    meaning: "Prescribed motion.",
+    keys: &[
+        key("velocity", axes(Dimension::VELOCITY, false), ZERO, "Velocity."),
+        key("spin", axes(Dimension::RATE, false), ZERO, "Angular velocity."),
+    ],
+};
+
+const NORMAL_LAW: &str = "Normal force law.";
+const TANGENTIAL_LAW: &str = "Tangential force law; without one, contacts are frictionless.";
+const ROLLING_LAW: &str = "Rolling and twisting resistance; without one, there is none.";
+
+/// `[contact]`.
+pub static CONTACT: Table = Table {
+    meaning: "Contact laws of every pair of materials that no [[pair]] changes. A law is a section, \
+              [contact.normal.hertz], or its name for all its defaults, normal = \"hertz\".",
+    keys: &[
+        key("normal", Kind::Law(Role::Normal), Required, NORMAL_LAW),
+        key("tangential", Kind::Law(Role::Tangential), Default::Word("none"), TANGENTIAL_LAW),
+        key("rolling", Kind::Law(Role::Rolling), Default::Word("none"), ROLLING_LAW),
+        key(
+            "max_overlap_fraction",
+            number(Dimension::NONE, Range::closed(1e-6, 1.0)),
+            Default::Number(0.2),
+            "A contact whose overlap exceeds this fraction of the smaller radius stops the run.",
+        ),
+    ],
+};
+
+/// `[[pair]]`.
+pub static PAIR: Table = Table {
+    meaning: "Laws and constants of one pair of materials. Where two materials differ in a constant, \
+              it must stand here: nothing is mixed silently.",
+    keys: &[
+        key("materials", Kind::Texts(2), Required, "Names of the two materials."),
+        key("normal", Kind::Law(Role::Normal), Derived("as in [contact]"), NORMAL_LAW),
+        key("tangential", Kind::Law(Role::Tangential), Derived("as in [contact]"), TANGENTIAL_LAW),
+        key("rolling", Kind::Law(Role::Rolling), Derived("as in [contact]"), ROLLING_LAW),
+        key(
+            "restitution",
+            number(Dimension::NONE, Range::FRACTION),
+            Derived("that of the materials, if equal"),
+            "Coefficient of restitution.",
+        ),
+        key("friction", COEFFICIENT, Derived("that of the materials, if equal"), "Coulomb friction coefficient."),
+        key(
+            "rolling_friction",
+            COEFFICIENT,
+            Derived("that of the materials, if equal"),
+            "Rolling friction coefficient.",
+        ),
+        key(
+            "twisting_friction",
+            COEFFICIENT,
+            Derived("that of the materials, if equal"),
+            "Twisting friction coefficient.",
+        ),
+    ],
+};
+
+/// `[packing]`.
+pub static PACKING: Table = Table {
+    meaning: "How the initial positions are made.",
+    keys: &[
+        key("random_close", Kind::Table(&RANDOM_CLOSE), Absent, "Jodrey-Tory random close packing."),
+        key("file", Kind::Table(&FILE), Absent, "Particles from a file."),
+    ],
+};
+
+static RANDOM_CLOSE: Table = Table {
+    meaning: "Jodrey-Tory random close packing of spheres in a periodic cell; ends with spheres just touching.",
+    keys: &[
+        key(
+            "contraction_rate",
+            number(Dimension::NONE, Range::between(0.0, 1.0)),
+            Default::Number(0.001),
+            "How fast the outer diameter contracts; smaller is denser and slower.",
+        ),
+        key(
+            "max_moves_per_particle",
+            number(Dimension::NONE, Range::POSITIVE),
+            Default::Number(1e5),
+            "Give up after this many moves per particle.",
+        ),
+    ],
+};
+
+static FILE: Table = Table {
+    meaning: "Particles from a file; the cell's `sides` must be given.",
+    keys: &[key(
+        "path",
+        Kind::Text,
+        Required,
+        "CSV or HDF5 file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
+         optionally vx_m/s, vy_m/s, vz_m/s, wx_rad/s, wy_rad/s, wz_rad/s.",
+    )],
+};
+
+/// `[load]`.
+pub static LOAD: Table = Table {
+    meaning: "What all stages share.",
+    keys: &[
+        key(
+            "kinematics",
+            Kind::Choice(&["BCT", "BC"]),
+            Default::Word("BCT"),
+            "BCT: particles move with the strain increment; BC: only the cell changes.",
+        ),
+        key(
+            "routine",
+            Kind::Choice(&["dynamic", "quasi_static"]),
+            Default::Word("dynamic"),
+            "dynamic: physical time. (quasi_static is not available yet.)",
+        ),
+        key(
+            "control_interval",
+            Kind::Integer(1),
+            Default::Integer(50),
+            "Evaluate what hangs on the whole system (automatic time step, servo, stress ends) every so many steps.",
+        ),
+    ],
+};
+
+/// `[[stage]]`.
+pub static STAGE: Table = Table {
+    meaning: "A stage of the load programme; it ends at the first of its end conditions that is met. Compression is \
+              positive. Give `strain_rate`, `stress` (on other axes) or `hold`; or `cycles` and [[stage.part]].",
+    keys: &[
+        key("name", Kind::Text, Derived("stage 1, stage 2, …"), "Name shown in the log."),
+        key("cycles", Kind::Integer(1), Absent, "Run the parts of this stage so many times."),
+        key("part", Kind::List(&PART), Absent, "What one cycle consists of, in order."),
+        PART_KEYS[1],
+        PART_KEYS[2],
+        PART_KEYS[3],
+        PART_KEYS[4],
+        PART_KEYS[5],
+        PART_KEYS[6],
+        PART_KEYS[7],
+    ],
+};
+
+/// `[[stage.part]]`.
+pub static PART: Table =
+    Table { meaning: "One part of a cycle; keys as in [[stage]], without `cycles`.", keys: &PART_KEYS };
+
+const PART_KEYS: [Key; 8] = [
+    key("name", Kind::Text, Derived("part 1, part 2, …"), "Name shown in the log."),
+    key(
+        "strain_rate",
+        axes(Dimension::RATE, true),
+        Absent,
+        "Nominal strain rate; one value is isotropic, {z = …} uniaxial.",
+    ),
+    key("stress", Kind::Table(&STRESS), Absent, "Servo to a stress, per axis."),
+    key("hold", Kind::Flag, Absent, "true: the cell stays as it is."),
+    key("duration", number(Dimension::TIME, Range::POSITIVE), Absent, "Ends after this time."),
+    key(
+        "until_strain",
+        Kind::Table(&UNTIL_STRAIN),
+        Absent,
+        "Ends when the strain of the axis, counted from the start of the run, passes this value.",
+    ),
+    key("until_stress", Kind::Table(&UNTIL_STRESS), Absent, "Ends when the stress of the axis passes this value."),
+    key("steps", Kind::Integer(1), Absent, "Ends after so many steps."),
+];
+
+static STRESS: Table = Table {
+    meaning: "Axes under constant stress.",
+    keys: &[
+        key("x", Kind::Table(&SERVO), Absent, "Servo of the x axis."),
+        key("y", Kind::Table(&SERVO), Absent, "Servo of the y axis."),
+        key("z", Kind::Table(&SERVO), Absent, "Servo of the z axis."),
+    ],
+};
+
+static SERVO: Table = Table {
+    meaning: "Servo of one axis.",
+    keys: &[
+        key("target", number(Dimension::PRESSURE, Range::ANY), Required, "Stress to reach and hold."),
+        key("max_rate", number(Dimension::RATE, Range::POSITIVE), Required, "Largest strain rate of the servo."),
+    ],
+};
+
+const STRAIN: Kind =
+    number(Dimension::NONE, Range { min: f64::NEG_INFINITY, max: 1.0, min_allowed: false, max_allowed: false });
+
+static UNTIL_STRAIN: Table = Table {
+    meaning: "One axis and its strain.",
+    keys: &[
+        key("x", STRAIN, Absent, "Strain of the x axis."),
+        key("y", STRAIN, Absent, "Strain of the y axis."),
+        key("z", STRAIN, Absent, "Strain of the z axis."),
+    ],
+};
+
+static UNTIL_STRESS: Table = Table {
+    meaning: "One axis and its stress.",
+    keys: &[
+        key("x", number(Dimension::PRESSURE, Range::ANY), Absent, "Stress of the x axis."),
+        key("y", number(Dimension::PRESSURE, Range::ANY), Absent, "Stress of the y axis."),
+        key("z", number(Dimension::PRESSURE, Range::ANY), Absent, "Stress of the z axis."),
+    ],
+};
+
+/// `[time_step]`.
+pub static TIME_STEP: Table = Table {
+    meaning: "The time step; a plain value is the fixed one.",
+    keys: &[
+        key("automatic", Kind::Table(&AUTOMATIC), Absent, "From the stiffest contact, re-evaluated."),
+        key("fixed", number(Dimension::TIME, Range::POSITIVE), Absent, "Set by hand."),
+    ],
+};
+
+static AUTOMATIC: Table = Table {
+    meaning: "safety · √(smallest mass / largest contact stiffness).",
+    keys: &[
+        key("safety", number(Dimension::NONE, Range::FRACTION), Default::Number(0.17), "Factor β."),
+        key(
+            "reference_overlap",
+            number(Dimension::NONE, Range::between(0.0, 1.0)),
+            Default::Number(1e-3),
+            "Overlap over radius at which the stiffness is taken at least.",
+        ),
+    ],
+};
+
+/// `[output]`.
+pub static OUTPUT: Table = Table {
+    meaning: "What is written, and how often.",
+    keys: &[
+        key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory."),
+        key("history", Kind::Interval, Default::Word("1000 steps"), "A row of history.csv every so often."),
+        key("snapshots", Kind::Interval, Absent, "A snapshot every so often; none without it."),
+        key("snapshot_contacts", Kind::Flag, Default::Flag(false), "Write contacts with force and memory too."),
+        key(
+            "checkpoint_steps",
+            Kind::Integer(0),
+            Default::Integer(100_000),
+            "A checkpoint every so many steps; 0: at the end only.",
+        ),
+        key(
+            "checkpoint_wall_time",
+            number(Dimension::TIME, Range::POSITIVE),
+            Absent,
+            "A checkpoint every so much wall time too.",
+        ),
+        key("checkpoints_kept", Kind::Integer(1), Default::Integer(2), "Older checkpoints are removed."),
+        key(
+            "energy_ledger",
+            Kind::Flag,
+            Default::Flag(false),
+            "Keep account of work and dissipation by cause; costs some speed.",
+        ),
+        key("plots", Kind::Flag, Default::Flag(true), "Draw plots at the end."),
+    ],
+};
+
+/// `[parallel]`.
+pub static PARALLEL: Table = Table {
+    meaning: "Ranks, threads, lists. Nothing here changes a result.",
+    keys: &[
+        key("grid", Kind::Integers3, Absent, "Ranks per axis; chosen by itself if absent."),
+        key("threads", Kind::Integer(1), Absent, "Threads per rank; chosen by itself if absent."),
+        key(
+            "skin",
+            number(Dimension::NONE, Range::between(0.0, 1.0)),
+            Default::Number(0.1),
+            "Skin of the Verlet list as a fraction of the largest diameter.",
+        ),
+        key(
+            "min_particles_per_rank",
+            Kind::Integer(1),
+            Default::Integer(100),
+            "The automatic grid gives no rank fewer.",
+        ),
+    ],
+};

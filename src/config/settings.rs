@@ -1,0 +1,183 @@
+//! Reads cell, packing, time step, output and parallel layout.
+
+use super::section::{Chosen, Section};
+use super::{
+    Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, RadiusDistribution, Species, TimeStepConfig,
+};
+use std::path::{Path, PathBuf};
+
+/// Read `[cell]`.
+pub(super) fn read_cell(root: &Section, materials: &[String]) -> Option<CellConfig> {
+    let section = root.table("cell")?;
+    let sides = section.axes("sides");
+    let solid_fraction = section.number("solid_fraction");
+    let aspect = section.axes("aspect");
+    if section.given("sides") {
+        for key in ["solid_fraction", "aspect"].into_iter().filter(|key| section.given(key)) {
+            section.problem(key, "given together with `sides`, which settle it", "remove one of the two");
+        }
+    }
+    let words = section.axis_words("boundary");
+    let walls = section.axis_words("wall_material");
+    let mut faulty = (section.given("sides") && sides.is_none()) || words.iter().any(Option::is_none);
+    let boundary = [0, 1, 2].map(|axis| {
+        if words[axis].as_deref() != Some("walls") {
+            return Boundary::Periodic;
+        }
+        let Some(name) = &walls[axis] else {
+            let message = format!("missing for the walls of the {} axis", ["x", "y", "z"][axis]);
+            section.problem("wall_material", message, "name a [[material]], for example wall_material = \"steel\"");
+            faulty = true;
+            return Boundary::Periodic;
+        };
+        match super::particles::find_material(&section, "wall_material", name, materials) {
+            Some(material) => Boundary::Walls { material },
+            None => {
+                faulty = true;
+                Boundary::Periodic
+            }
+        }
+    });
+    if section.given("wall_material") && !words.iter().flatten().any(|word| word == "walls") {
+        section.problem("wall_material", "no axis has walls", "remove it, or set boundary = {z = \"walls\", …}");
+    }
+    (!faulty).then_some(CellConfig { sides, aspect: aspect?, solid_fraction, boundary })
+}
+
+/// Read `[packing]`; paths are relative to `folder`.
+pub(super) fn read_packing(root: &Section, folder: &Path) -> Option<PackingConfig> {
+    match root.choose("packing")? {
+        Chosen::Table("file", section) => {
+            let path = folder.join(section.text("path")?);
+            if !path.is_file() {
+                let message = format!("there is no file {}", path.display());
+                section.problem("path", message, "the path is relative to the folder of this input");
+                return None;
+            }
+            // Absolute, so that the resolved text runs from wherever it is kept.
+            let absolute = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
+            section.record_text("path", &absolute.to_string_lossy());
+            Some(PackingConfig::File { path })
+        }
+        Chosen::Table(_, section) => {
+            let contraction_rate = section.number("contraction_rate");
+            let max_moves_per_particle = section.number("max_moves_per_particle");
+            Some(PackingConfig::RandomClose {
+                contraction_rate: contraction_rate?,
+                max_moves_per_particle: max_moves_per_particle?,
+            })
+        }
+        Chosen::Value(..) => None,
+    }
+}
+
+/// Spheres that fill more than this cannot be packed (the densest packing of equal spheres).
+const DENSEST: f64 = 0.7405;
+
+/// Whether cell, packing and particles fit together.
+pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingConfig, species: &[Species]) {
+    let Some(section) = root.reopened("cell") else { return };
+    if let PackingConfig::File { .. } = packing {
+        if cell.sides.is_none() {
+            section.problem(
+                "sides",
+                "missing: packing.file needs a cell of given sides",
+                "add sides = [\"…\", \"…\", \"…\"]",
+            );
+        }
+        return;
+    }
+    #[allow(clippy::cast_precision_loss)]
+    let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
+    let (key, fraction) = match (cell.sides, cell.solid_fraction) {
+        (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
+        (None, Some(fraction)) => ("solid_fraction", fraction),
+        (None, None) => return,
+    };
+    if fraction > DENSEST {
+        let message = format!("the particles would fill {fraction:.3} of the cell");
+        let remedy = "spheres cannot fill more than 0.74, random ones about 0.64: use a larger cell or fewer particles";
+        section.problem(key, message, remedy);
+    }
+    let largest = species.iter().map(|s| s.radius.max()).fold(0.0, f64::max);
+    for axis in 0..3 {
+        if let Some(side) = cell.sides.map(|sides| sides[axis]).filter(|side| *side < 2.0 * largest) {
+            let message = format!(
+                "side {} is {side:e} m, the largest particle {:e} m across",
+                ["x", "y", "z"][axis],
+                2.0 * largest
+            );
+            section.problem("sides", message, "make every side at least one diameter");
+        }
+    }
+}
+
+/// Read `[time_step]`.
+pub(super) fn read_time_step(root: &Section) -> Option<TimeStepConfig> {
+    match root.choose("time_step")? {
+        Chosen::Value(_, value) => value.map(TimeStepConfig::Fixed),
+        Chosen::Table(_, section) => {
+            let (safety, reference_overlap) = (section.number("safety"), section.number("reference_overlap"));
+            Some(TimeStepConfig::Automatic { safety: safety?, reference_overlap: reference_overlap? })
+        }
+    }
+}
+
+/// Read `[output]`; `stem` names the default directory.
+pub(super) fn read_output(root: &Section, stem: &str) -> Option<OutputConfig> {
+    let section = root.table("output")?;
+    let directory = section.text_or("directory", &format!("runs/{stem}"));
+    if directory.as_deref() == Some("") {
+        section.problem("directory", "is empty", "name a folder, for example \"runs/first\"");
+    }
+    let history = section.interval("history");
+    let snapshots = section.interval("snapshots");
+    let snapshot_contacts = section.flag("snapshot_contacts");
+    if snapshot_contacts == Some(true) && !section.given("snapshots") {
+        section.problem("snapshot_contacts", "has no effect without snapshots", "add snapshots = \"1 s\" or remove it");
+    }
+    let checkpoint_steps = section.integer("checkpoint_steps");
+    let checkpoint_wall_time = section.number("checkpoint_wall_time");
+    let checkpoints_kept = section.integer("checkpoints_kept");
+    let energy_ledger = section.flag("energy_ledger");
+    let plots = section.flag("plots");
+    Some(OutputConfig {
+        directory: PathBuf::from(directory?),
+        history: history?,
+        snapshots,
+        snapshot_contacts: snapshot_contacts?,
+        checkpoint_steps: checkpoint_steps?,
+        checkpoint_wall_time,
+        checkpoints_kept: usize::try_from(checkpoints_kept?).ok()?,
+        energy_ledger: energy_ledger?,
+        plots: plots?,
+    })
+}
+
+/// Read `[parallel]`.
+pub(super) fn read_parallel(root: &Section) -> Option<ParallelConfig> {
+    let section = root.table("parallel")?;
+    let grid = section.integers3("grid");
+    let threads = section.integer("threads");
+    let skin = section.number("skin");
+    let min_particles_per_rank = section.integer("min_particles_per_rank");
+    Some(ParallelConfig {
+        grid,
+        threads: threads.and_then(|count| usize::try_from(count).ok()),
+        skin: skin?,
+        min_particles_per_rank: usize::try_from(min_particles_per_rank?).ok()?,
+    })
+}
+
+impl RadiusDistribution {
+    /// One word for tables.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Fixed(_) => "fixed",
+            Self::Normal { .. } => "normal",
+            Self::Lognormal { .. } => "lognormal",
+            Self::Tabulated { .. } => "tabulated",
+        }
+    }
+}

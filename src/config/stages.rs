@@ -1,0 +1,197 @@
+//! Reads the load programme and checks that every stage can end.
+
+use super::programme::{Progress, advance};
+use super::section::Section;
+use super::{AxisControl, Boundary, CellConfig, Kinematics, Stage};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What all stages share: load type and control interval.
+pub(super) fn read_load(root: &Section) -> Option<(Kinematics, u64)> {
+    let section = root.table("load")?;
+    let kinematics = section.choice("kinematics").map(|index| [Kinematics::Bct, Kinematics::Bc][index]);
+    if section.choice("routine") == Some(1) {
+        section.problem("routine", "the quasi_static routine is not available yet", "use routine = \"dynamic\"");
+    }
+    let interval = section.integer("control_interval");
+    Some((kinematics?, interval?))
+}
+
+/// Read `[[stage]]`, cycles written out.
+pub(super) fn read(root: &Section, cell: Option<&CellConfig>) -> Option<Vec<Stage>> {
+    let mut stages: Vec<Option<Stage>> = Vec::new();
+    let mut progress = Progress::default();
+    for (index, section) in root.list("stage").iter().enumerate() {
+        let name = section.text_or("name", &format!("stage {}", index + 1)).unwrap_or_default();
+        let cycles = section.integer("cycles");
+        let parts = section.list("part");
+        if !section.given("cycles") && !section.given("part") {
+            let stage = read_stage(section, name, cell);
+            push(section, &mut stages, &mut progress, stage);
+            continue;
+        }
+        refuse_own_load(section);
+        let parts: Vec<(Option<Stage>, Section)> = parts
+            .into_iter()
+            .enumerate()
+            .map(|(k, part)| {
+                let name = part.text_or("name", &format!("part {}", k + 1)).unwrap_or_default();
+                (read_stage(&part, name, cell), part)
+            })
+            .collect();
+        let cycles = cycles.unwrap_or(1);
+        if cycles.saturating_mul(parts.len() as u64) > MAX_STAGES {
+            section.problem(
+                "cycles",
+                format!("{cycles} cycles of {} parts", parts.len()),
+                "at most 100000 stages in all",
+            );
+            return None;
+        }
+        for cycle in 1..=cycles {
+            for (part, part_section) in &parts {
+                let stage = part.clone().map(|s| Stage { name: format!("{name} {cycle}/{cycles}: {}", s.name), ..s });
+                push(part_section, &mut stages, &mut progress, stage);
+            }
+        }
+    }
+    stages.into_iter().collect()
+}
+
+const MAX_STAGES: u64 = 100_000;
+
+fn refuse_own_load(section: &Section) {
+    if !section.given("part") {
+        section.problem("part", "missing", "say what one cycle consists of, in [[stage.part]] sections");
+    }
+    if !section.given("cycles") {
+        section.problem("cycles", "missing", "say how often the parts are run, for example cycles = 3");
+    }
+    let own = ["strain_rate", "stress", "hold", "duration", "until_strain", "until_stress", "steps"];
+    for key in own.into_iter().filter(|key| section.given(key)) {
+        section.problem(key, "has no effect beside [[stage.part]]", "move it into a [[stage.part]]");
+    }
+}
+
+fn read_stage(section: &Section, name: String, cell: Option<&CellConfig>) -> Option<Stage> {
+    let rates = section.axes("strain_rate");
+    let hold = section.flag("hold");
+    let servos = read_servos(section, cell);
+    let duration = section.number("duration");
+    let steps = section.integer("steps");
+    let until_strain = one_axis(section, "until_strain");
+    let until_stress = one_axis(section, "until_stress");
+    let given = ["strain_rate", "stress", "hold"].map(|key| section.given(key));
+    if given == [false; 3] || hold == Some(false) && !given[0] && !given[1] {
+        section.problem(
+            "strain_rate",
+            "the stage says nothing of its load",
+            "give `strain_rate`, `stress`, or hold = true",
+        );
+        return None;
+    }
+    if hold == Some(true) && (given[0] || given[1]) {
+        section.problem("hold", "a held cell has no strain_rate or stress", "remove hold, or the other key");
+        return None;
+    }
+    if !["duration", "steps", "until_strain", "until_stress"].iter().any(|key| section.given(key)) {
+        section.problem(
+            "duration",
+            "the stage has no end condition",
+            "give duration, until_strain, until_stress or steps",
+        );
+        return None;
+    }
+    let rates = if given[0] { rates? } else { [0.0; 3] };
+    let servos = servos?;
+    for axis in 0..3 {
+        if servos[axis].is_some() && rates[axis] != 0.0 {
+            let message = format!("the {} axis has a strain rate and a stress", AXES[axis]);
+            section.problem("strain_rate", message, "give each axis one of them, for example strain_rate = {z = …}");
+            return None;
+        }
+    }
+    let axes = [0, 1, 2].map(|axis| servos[axis].unwrap_or(AxisControl::StrainRate(rates[axis])));
+    Some(Stage { name, axes, duration, until_strain, until_stress, steps })
+}
+
+fn read_servos(section: &Section, cell: Option<&CellConfig>) -> Option<[Option<AxisControl>; 3]> {
+    let Some(stress) = section.table("stress") else { return Some([None; 3]) };
+    let mut faulty = false;
+    let servos = [0, 1, 2].map(|axis| {
+        let servo = stress.table(AXES[axis])?;
+        if cell.is_some_and(|cell| cell.boundary[axis] != Boundary::Periodic) {
+            let message =
+                format!("the {} axis has walls, and the servo holds the stress of periodic axes only", AXES[axis]);
+            stress.problem(AXES[axis], message, "use boundary = \"periodic\" on this axis, or a strain_rate");
+            faulty = true;
+        }
+        let (target, max_rate) = (servo.number("target"), servo.number("max_rate"));
+        let control = target.zip(max_rate).map(|(target, max_rate)| AxisControl::Stress { target, max_rate });
+        faulty |= control.is_none();
+        control
+    });
+    if servos == [None; 3] && !faulty {
+        section.problem(
+            "stress",
+            "no axis is given",
+            "write, for example, stress = {z = {target = \"1 MPa\", max_rate = \"0.1 1/s\"}}",
+        );
+        return None;
+    }
+    (!faulty).then_some(servos)
+}
+
+/// The single axis of `until_strain` or `until_stress` and its value.
+fn one_axis(section: &Section, name: &str) -> Option<(usize, f64)> {
+    let table = section.table(name)?;
+    let values = AXES.map(|axis| table.number(axis));
+    let given: Vec<usize> = (0..3).filter(|axis| table.given(AXES[*axis])).collect();
+    let [axis] = given[..] else {
+        section.problem(
+            name,
+            format!("{} axes are given", given.len()),
+            format!("give one axis, for example {name} = {{z = …}}"),
+        );
+        return None;
+    };
+    Some((axis, values[axis]?))
+}
+
+/// Append a stage if it can end, following the strain as far as it is known.
+fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progress, stage: Option<Stage>) {
+    let Some(stage) = stage else {
+        progress.lose_track();
+        stages.push(None);
+        return;
+    };
+    let only_strain = stage.duration.is_none() && stage.steps.is_none() && stage.until_stress.is_none();
+    if let (Some((axis, target)), true) = (stage.until_strain, only_strain)
+        && let AxisControl::StrainRate(rate) = stage.axes[axis]
+    {
+        let start = progress.strain[axis];
+        if rate == 0.0 || start.is_some_and(|start| (target - start) * rate <= 0.0) {
+            let start = start.map_or_else(String::new, |start| format!(" from strain {start}"));
+            let message = format!("never reached{start} at strain rate {rate} 1/s of the {} axis", AXES[axis]);
+            section.problem("until_strain", message, "change the value, the strain rate's sign, or end by duration");
+            progress.lose_track();
+            stages.push(None);
+            return;
+        }
+    }
+    advance(progress, &stage);
+    for axis in 0..3 {
+        if progress.strain[axis].is_some_and(|strain| strain >= 1.0) {
+            let message = format!("the {} axis reaches a strain of 1 or more: the cell collapses", AXES[axis]);
+            section.problem(
+                "strain_rate",
+                message,
+                "end the stage earlier, or strain more slowly (compression is positive)",
+            );
+            progress.lose_track();
+            stages.push(None);
+            return;
+        }
+    }
+    stages.push(Some(stage));
+}
