@@ -38,7 +38,7 @@ fi
 # mpirun passes the signal on to every rank.
 mpirun -n "$ranks" --map-by "slot:PE=$threads" --bind-to core dem-mpi "${arguments[@]}" &
 launcher=$!
-trap 'kill -USR1 "$launcher" 2>/dev/null' USR1
+trap 'signalled=yes; kill -USR1 "$launcher" 2>/dev/null' USR1
 alarm=
 if [ "${limit:-0}" -gt "$grace" ]; then
     (
@@ -51,9 +51,9 @@ if [ "${limit:-0}" -gt "$grace" ]; then
     alarm=$!
 fi
 # `wait` also returns when a signal comes; then wait again for the program's own end.
-wait "$launcher"
-code=$?
-while kill -0 "$launcher" 2>/dev/null; do
+signalled=yes
+while [ "$signalled" = yes ]; do
+    signalled=no
     wait "$launcher"
     code=$?
 done

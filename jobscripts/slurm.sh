@@ -40,11 +40,11 @@ fi
 # signal on to every rank. Each rank keeps to its own cores.
 srun --cpu-bind=cores dem-mpi "${arguments[@]}" &
 launcher=$!
-trap 'kill -USR1 "$launcher" 2>/dev/null' USR1
+trap 'signalled=yes; kill -USR1 "$launcher" 2>/dev/null' USR1
 # `wait` also returns when a signal comes; then wait again for the program's own end.
-wait "$launcher"
-code=$?
-while kill -0 "$launcher" 2>/dev/null; do
+signalled=yes
+while [ "$signalled" = yes ]; do
+    signalled=no
     wait "$launcher"
     code=$?
 done

@@ -38,7 +38,7 @@ is_parallel_hdf5() {
 
 # Is the MPI in use an MPICH?
 mpi_is_mpich() {
-    "${MPICC:-mpicc}" -show 2>/dev/null | grep -i >/dev/null mpich
+    "${MPICC:-mpicc}" -show 2>/dev/null | grep -i mpich >/dev/null
 }
 
 # Include directory of the HDF5 that the build would take by itself.
@@ -66,7 +66,7 @@ run_ranks() {
     local ranks=$1 cores
     shift
     cores=$(getconf _NPROCESSORS_ONLN 2>/dev/null || echo 1)
-    if [ "$ranks" -gt "$cores" ] && mpirun --version 2>/dev/null | grep -i >/dev/null 'open mpi'; then
+    if [ "$ranks" -gt "$cores" ] && mpirun --version 2>/dev/null | grep -i 'open mpi' >/dev/null; then
         mpirun --oversubscribe -n "$ranks" "$@"
     else
         mpirun -n "$ranks" "$@"
