@@ -139,6 +139,18 @@ fn several_branches_match_the_hereditary_integral() {
 }
 
 #[test]
+fn splitting_the_last_branch_leaves_the_force_as_it_is() {
+    let maxwell = [(3e8, 0.03), (5e8, 0.4), (2e8, 7.0)]
+        .map(|(modulus, relaxation_time)| MaxwellBranch { modulus, relaxation_time });
+    assert_eq!(split_last_branch(&maxwell, 3), maxwell);
+    let constants = properties(1e9, 0.3, maxwell.to_vec());
+    let path = |t: f64| TOP * t * (2.0 - t);
+    let three = follow(law::<3>(constants.clone(), &[]), 1.5, 500, path);
+    let eight = follow(law::<8>(constants, &[]), 1.5, 500, path);
+    assert!(relative(eight[499], three[499]) < 1e-13);
+}
+
+#[test]
 fn mean_decay_keeps_its_digits_at_small_and_large_arguments() {
     assert_eq!(mean_decay(0.0), 1.0);
     for x in [1e-17, 1e-12, 1e-8, 1e-5] {
