@@ -70,10 +70,10 @@ fn reproduces_the_table_of_strain_rates() {
 }
 
 #[test]
-fn the_midpoint_scheme_reproduces_the_table_of_slow_strain_rates() {
-    // At 100 /s the table has rows after three steps, where the midpoint rule on √δ is off by percents.
+fn the_midpoint_scheme_reproduces_the_table_where_a_row_is_many_steps() {
+    // At 100 /s the table has rows after three steps, where the midpoint rule on √δ is off by a percent.
     let rows = table(include_str!("../../../tests/data/maxwell_zener_rates.csv"));
-    for rows in rows.chunks(20).skip(2) {
+    for rows in rows.chunks(20).skip(1) {
         let duration = 0.02 / rows[0][0];
         let per_row = (duration / TIME_STEP / 20.0).ceil() as usize;
         let forces = follow(midpoint(), duration, 20 * per_row, |t| TOP * t / duration);
