@@ -6,8 +6,8 @@ use super::shear::ShearSprings;
 use super::{hertz, maxwell_zener, mindlin, rolling};
 use crate::config::{MaxwellBranch, PairConfig};
 
-/// From one line per law, the list of laws and the match that builds them. A law's module holds
-/// `ENTRY` and `build`.
+/// From one line per law, the list of laws and the match that builds them. A law's module holds `ENTRY`,
+/// the law as input and documentation see it, and `build`, which hands the concrete law to a visitor.
 macro_rules! register {
     (normal: $($normal:ident)*; tangential: $($tangential:ident)*; rolling: $($rolling:ident)*;) => {
         static LAWS: &[LawEntry] = &[$($normal::ENTRY,)* $($tangential::ENTRY,)* $($rolling::ENTRY,)*];
@@ -231,103 +231,4 @@ impl PairProperties {
             [0, 1].map(|k| 2.0 * (2.0 - self.poisson_ratio[k]) * (1.0 + self.poisson_ratio[k]) / self.young_modulus[k]);
         1.0 / (a + b)
     }
-}
-
-// Stand-in until the laws arrive: names and parameters only, no forces. The branch of the laws
-// replaces everything from here to the end of the file.
-
-fn accept(_: &PairProperties) -> Result<(), String> {
-    Ok(())
-}
-
-fn equal_viscoelastic(properties: &PairProperties) -> Result<(), String> {
-    let [first, second] = &properties.names;
-    if first != second {
-        return Err(format!(
-            "maxwell_zener holds between equal materials only, not between \"{first}\" and \"{second}\"; \
-             give this pair a law of its own in a [[pair]] section, for example [pair.normal.hertz]"
-        ));
-    }
-    if properties.maxwell[0].is_empty() {
-        return Err(format!(
-            "maxwell_zener needs Maxwell branches and material \"{first}\" has none; add \
-             [[material.maxwell]] or use hertz"
-        ));
-    }
-    Ok(())
-}
-
-const CLIP: ParameterSpec = ParameterSpec {
-    name: "clip",
-    kind: ParameterKind::Flag,
-    default: ParameterValue::Flag(true),
-    doc: "the total normal force is never tensile",
-};
-
-static LAWS: [LawEntry; 4] = [
-    LawEntry {
-        name: "hertz",
-        role: Role::Normal,
-        summary: "Hertz spring and dashpot",
-        source: "W 3.1",
-        parameters: &[
-            ParameterSpec {
-                name: "damping",
-                kind: ParameterKind::Choice(&["none", "tsuji", "wahn"]),
-                default: ParameterValue::Choice(1),
-                doc: "dashpot",
-            },
-            CLIP,
-        ],
-        check: accept,
-    },
-    LawEntry {
-        name: "maxwell_zener",
-        role: Role::Normal,
-        summary: "viscoelastic Maxwell-Zener contact",
-        source: "W 3.7",
-        parameters: &[
-            ParameterSpec {
-                name: "scheme",
-                kind: ParameterKind::Choice(&["exact", "midpoint"]),
-                default: ParameterValue::Choice(0),
-                doc: "time integration",
-            },
-            CLIP,
-        ],
-        check: equal_viscoelastic,
-    },
-    LawEntry {
-        name: "mindlin",
-        role: Role::Tangential,
-        summary: "Mindlin spring and Coulomb slider",
-        source: "W 3.4",
-        parameters: &[ParameterSpec {
-            name: "factor",
-            kind: ParameterKind::Number { min: 1e-6, max: 1.0 },
-            default: ParameterValue::Number(2.0 / 3.0),
-            doc: "factor on the tangential stiffness",
-        }],
-        check: accept,
-    },
-    LawEntry {
-        name: "spring_slider",
-        role: Role::Rolling,
-        summary: "rolling and twisting resistance",
-        source: "PHYSICS section 3",
-        parameters: &[],
-        check: accept,
-    },
-];
-
-/// The law of this name and part of the contact.
-#[must_use]
-pub fn find(role: Role, name: &str) -> Option<&'static LawEntry> {
-    LAWS.iter().find(|law| law.role == role && law.name == name)
-}
-
-/// Names of the laws for this part of the contact.
-#[must_use]
-pub fn names(role: Role) -> Vec<&'static str> {
-    LAWS.iter().filter(|law| law.role == role).map(|law| law.name).collect()
 }
