@@ -194,6 +194,18 @@ fn prune(directory: &Path, step: u64, keep: usize) -> Result<()> {
     for &old in older.iter().take(surplus) {
         remove(&directory.join(file_name(old)))?;
     }
+    remove_unfinished(directory)
+}
+
+/// What a kill during a write has left; nobody is writing now.
+fn remove_unfinished(directory: &Path) -> Result<()> {
+    let entries = fs::read_dir(directory).map_err(|error| io_error(directory, "read the folder", &error))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| name.starts_with("checkpoint-") && name.ends_with(".h5.part")) {
+            remove(&entry.path())?;
+        }
+    }
     Ok(())
 }
 

@@ -64,6 +64,7 @@ fn contacts_without_memory_and_no_contacts_at_all_survive() {
 #[test]
 fn only_the_newest_are_kept_and_later_ones_can_be_discarded() {
     let folder = tempfile::tempdir().expect("folder");
+    fs::write(folder.path().join("checkpoint-000000000005.h5.part"), "cut off by a kill").expect("write");
     for step in [10, 20, 30] {
         write_sample(folder.path(), step, 2);
     }
