@@ -1,74 +1,45 @@
-//! Rows to the ranks that hold the blocks of their ids: how files come to be in id order.
-
+//! Stand-in: one process.
 use super::Communicator;
+use crate::error::Result;
 use crate::state::{ContactMemory, ParticleState};
 
-/// The rank whose id block `[r·N/P, (r+1)·N/P)` holds an id.
+/// First id of a block.
 #[must_use]
-pub fn block_of(id: u32, total: u64, ranks: usize) -> usize {
-    (((u64::from(id) + 1) * ranks as u64 - 1) / total) as usize
+pub fn block_start(rank: usize, total: u64, ranks: usize) -> u64 {
+    (rank as u128 * u128::from(total) / ranks as u128) as u64
 }
 
-/// Particles to their id blocks, sorted by id, with the first id of this rank's block.
+/// Rank of an id.
 #[must_use]
-pub fn to_id_blocks(comm: &Communicator, total: u64, particles: Vec<ParticleState>) -> (u64, Vec<ParticleState>) {
-    let ranks = comm.size();
-    let start = comm.rank() as u64 * total / ranks as u64;
-    let mut particles = if ranks == 1 {
-        particles
-    } else {
-        let mut sends = vec![Vec::new(); ranks];
-        for state in &particles {
-            sends[block_of(state.id, total, ranks)].extend_from_slice(bytemuck::bytes_of(state));
-        }
-        bytemuck::pod_collect_to_vec(&comm.all_to_all(sends).concat())
-    };
-    particles.sort_unstable_by_key(|state| state.id);
-    (start, particles)
+pub fn block_of(id: u64, total: u64, ranks: usize) -> usize {
+    (((u128::from(id) + 1) * ranks as u128 - 1) / u128::from(total.max(1))) as usize
 }
 
-/// Contact memory to the id blocks of the lower ids, sorted by key.
-#[must_use]
-pub fn memory_to_id_blocks(comm: &Communicator, total: u64, memory: ContactMemory) -> ContactMemory {
-    let ranks = comm.size();
-    if ranks == 1 {
-        return memory.sorted_without_copies();
-    }
-    let rows: Vec<(usize, usize)> =
-        memory.keys.iter().enumerate().map(|(row, key)| (row, block_of(key.low, total, ranks))).collect();
-    send_memory(comm, &memory, &rows).sorted_without_copies()
+/// Blocks of ids.
+#[allow(clippy::missing_errors_doc)]
+pub fn to_id_blocks(
+    _comm: &Communicator,
+    _total: u64,
+    mut particles: Vec<ParticleState>,
+    _step: u64,
+) -> Result<(u64, Vec<ParticleState>)> {
+    particles.sort_by_key(|p| p.id);
+    Ok((0, particles))
 }
 
-/// Send rows of contact memory, given as (row, rank); returns what arrives, own rows included.
-#[must_use]
-pub fn send_memory(comm: &Communicator, memory: &ContactMemory, rows: &[(usize, usize)]) -> ContactMemory {
-    let mut keys = vec![Vec::new(); comm.size()];
-    let mut values = vec![Vec::new(); comm.size()];
-    for (row, to) in rows {
-        keys[*to].extend_from_slice(bytemuck::bytes_of(&memory.keys[*row]));
-        values[*to].extend_from_slice(bytemuck::cast_slice(memory.row(*row)));
+/// Blocks of low ids.
+#[allow(clippy::missing_errors_doc)]
+pub fn memory_to_id_blocks(
+    _comm: &Communicator,
+    _total: u64,
+    memory: &ContactMemory,
+    _step: u64,
+) -> Result<ContactMemory> {
+    let mut order: Vec<usize> = (0..memory.keys.len()).collect();
+    order.sort_by_key(|&i| memory.keys[i]);
+    let mut sorted = ContactMemory::new(memory.width);
+    for i in order {
+        sorted.push(memory.keys[i], memory.row(i));
     }
-    ContactMemory {
-        keys: bytemuck::pod_collect_to_vec(&comm.all_to_all(keys).concat()),
-        width: memory.width,
-        values: bytemuck::pod_collect_to_vec(&comm.all_to_all(values).concat()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_id_lies_in_its_block() {
-        for total in [1_u64, 7, 10, 250, 1001] {
-            for ranks in [1_usize, 2, 3, 8, 13] {
-                for id in 0..total {
-                    let rank = block_of(id as u32, total, ranks) as u64;
-                    let (from, to) = (rank * total / ranks as u64, (rank + 1) * total / ranks as u64);
-                    assert!((from..to).contains(&id), "id {id} of {total} on {ranks}: rank {rank}");
-                }
-            }
-        }
-    }
+    Ok(sorted)
 }
