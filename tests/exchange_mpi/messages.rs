@@ -102,7 +102,7 @@ pub fn print_sums(comm: &Communicator) {
     let mut sums = vec![ExactSum::new(); 4];
     let mine: Vec<u64> = (0..TERMS).filter(|id| id % comm.size() as u64 == comm.rank() as u64).collect();
     for (&id, &reversed) in mine.iter().zip(mine.iter().rev()) {
-        let scale = |id: u64| f64::from_bits((random([id, 0, 2]) * 2046.0) as u64 + 1 << 52);
+        let scale = |id: u64| f64::from_bits(((random([id, 0, 2]) * 2046.0) as u64 + 1) << 52);
         sums[0].add(random([id, 0, 0]) - 0.5);
         sums[1].add(random([reversed, 0, 0]) - 0.5);
         sums[2].add((random([id, 0, 1]) - 0.5) * scale(id) * 1e-6);
