@@ -1,6 +1,7 @@
 //! The checked input in SI units: what every later stage reads. Built by [`load`] from a TOML file;
 //! knows nothing of ranks or of the simulation's state.
 
+mod alternatives;
 mod build;
 mod contact;
 mod diagnostic;
@@ -14,6 +15,7 @@ pub mod schema;
 mod section;
 mod settings;
 mod stages;
+mod values;
 
 pub use build::load;
 

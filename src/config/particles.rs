@@ -1,8 +1,9 @@
 //! Reads materials and species.
 
+use super::alternatives::Chosen;
 use super::diagnostic::did_you_mean;
 use super::schema::quoted;
-use super::section::{Chosen, Section};
+use super::section::Section;
 use super::{Material, MaxwellBranch, Motion, RadiusDistribution, Species};
 
 /// All materials: their names (also of faulty ones, so that no reference to them looks wrong) and,
@@ -281,7 +282,7 @@ fn read_radius(chosen: Chosen) -> Option<RadiusDistribution> {
             }
             Some(RadiusDistribution::Tabulated { radius, weight })
         }
-        Chosen::Value(_, value) => value.map(RadiusDistribution::Fixed),
+        Chosen::Value(value) => value.map(RadiusDistribution::Fixed),
     }
 }
 
