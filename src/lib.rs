@@ -2,10 +2,16 @@
 //! MPI ranks and threads, with the same bits on every machine shape. See `ARCHITECTURE.md`.
 
 pub mod config;
+pub mod contact;
 pub mod error;
 pub mod exchange;
 pub mod force;
+pub mod integrate;
+pub mod load;
+pub mod neighbour;
 pub mod output;
 pub mod packing;
+pub mod setup;
+pub mod simulation;
 pub mod state;
 pub mod units;

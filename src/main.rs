@@ -1,1 +1,5 @@
-fn main() {}
+//! The `dem-mpi` command.
+
+fn main() {
+    std::process::exit(dem_mpi::cli::main());
+}

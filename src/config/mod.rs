@@ -136,11 +136,34 @@ pub enum RadiusDistribution {
     /// All equal \[m\].
     Fixed(f64),
     /// Normal, cut to \[min, max\] \[m\].
-    Normal { mean: f64, deviation: f64, min: f64, max: f64 },
+    Normal {
+        /// Mean \[m\].
+        mean: f64,
+        /// Standard deviation \[m\].
+        deviation: f64,
+        /// Smallest radius \[m\].
+        min: f64,
+        /// Largest radius \[m\].
+        max: f64,
+    },
     /// Lognormal: `median` \[m\] and the deviation of ln R, cut to \[min, max\].
-    Lognormal { median: f64, sigma: f64, min: f64, max: f64 },
+    Lognormal {
+        /// Median \[m\].
+        median: f64,
+        /// Standard deviation of ln R.
+        sigma: f64,
+        /// Smallest radius \[m\].
+        min: f64,
+        /// Largest radius \[m\].
+        max: f64,
+    },
     /// Radii \[m\] with number weights.
-    Tabulated { radius: Vec<f64>, weight: Vec<f64> },
+    Tabulated {
+        /// Radii \[m\].
+        radius: Vec<f64>,
+        /// Number weight of each radius.
+        weight: Vec<f64>,
+    },
 }
 
 /// How a species moves.
@@ -149,7 +172,12 @@ pub enum Motion {
     /// Forces move it.
     Free,
     /// Prescribed velocity \[m/s\] and spin \[rad/s\], whatever the forces (fixed: both zero).
-    Driven { velocity: [f64; 3], spin: [f64; 3] },
+    Driven {
+        /// Velocity \[m/s\].
+        velocity: [f64; 3],
+        /// Angular velocity \[rad/s\].
+        spin: [f64; 3],
+    },
 }
 
 /// A particle species.
@@ -220,7 +248,12 @@ pub enum AxisControl {
     /// Nominal strain rate \[1/s\] (0: hold).
     StrainRate(f64),
     /// Servo to this stress \[Pa\] with at most this strain rate \[1/s\].
-    Stress { target: f64, max_rate: f64 },
+    Stress {
+        /// Stress to reach and to keep \[Pa\].
+        target: f64,
+        /// Largest strain rate that the servo may use \[1/s\].
+        max_rate: f64,
+    },
 }
 
 /// One stage of the load programme; it ends at the first end condition met.
@@ -244,7 +277,12 @@ pub struct Stage {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeStepConfig {
     /// Δt = β √(m_min/K_max), re-evaluated every control interval; floor of K at `reference_overlap` × R.
-    Automatic { safety: f64, reference_overlap: f64 },
+    Automatic {
+        /// Safety factor β.
+        safety: f64,
+        /// Overlap over radius at which the floor of K is taken.
+        reference_overlap: f64,
+    },
     /// A fixed step \[s\].
     Fixed(f64),
 }

@@ -26,10 +26,13 @@ pub trait Lane:
     /// Write the lanes to the first `WIDTH` places of a slice.
     fn store(self, values: &mut [f64]);
     /// Square root.
+    #[must_use]
     fn sqrt(self) -> Self;
     /// `if self > other { self } else { other }`.
+    #[must_use]
     fn max(self, other: Self) -> Self;
     /// `if self < other { self } else { other }`.
+    #[must_use]
     fn min(self, other: Self) -> Self;
     /// `self < other`.
     fn less(self, other: Self) -> Self::Mask;
@@ -77,6 +80,132 @@ impl Lane for f64 {
     #[inline(always)]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
+    }
+}
+
+/// Eight `f64` side by side in plain loops: no intrinsics, so it runs anywhere, and it proves in tests
+/// that a law written over [`Lane`] gives each lane the scalar bits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Portable8(pub [f64; 8]);
+
+/// Result of comparisons of [`Portable8`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PortableMask8(pub [bool; 8]);
+
+impl Portable8 {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    }
+    #[inline(always)]
+    fn compare(self, other: Self, f: impl Fn(f64, f64) -> bool) -> PortableMask8 {
+        PortableMask8(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    }
+}
+
+impl Add for Portable8 {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Portable8 {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Portable8 {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl Div for Portable8 {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+}
+
+impl Neg for Portable8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|a| -a))
+    }
+}
+
+impl BitAnd for PortableMask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(std::array::from_fn(|k| self.0[k] & other.0[k]))
+    }
+}
+
+impl BitOr for PortableMask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(std::array::from_fn(|k| self.0[k] | other.0[k]))
+    }
+}
+
+impl Not for PortableMask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(self.0.map(|a| !a))
+    }
+}
+
+impl Lane for Portable8 {
+    type Mask = PortableMask8;
+    const WIDTH: usize = 8;
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value; 8])
+    }
+    #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        let values = &values[..8];
+        Self(std::array::from_fn(|k| values[k]))
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64]) {
+        values[..8].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> PortableMask8 {
+        self.compare(other, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn greater(self, other: Self) -> PortableMask8 {
+        self.compare(other, |a, b| a > b)
+    }
+    #[inline(always)]
+    fn select(mask: PortableMask8, yes: Self, no: Self) -> Self {
+        Self(std::array::from_fn(|k| if mask.0[k] { yes.0[k] } else { no.0[k] }))
     }
 }
 

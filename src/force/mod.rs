@@ -1,5 +1,19 @@
 //! Contact laws: pure functions of one touch and that contact's own memory, and the loop around them.
 
+pub mod composition;
+pub mod dashpot;
+mod documentation;
+pub mod geometry;
+pub mod hertz;
 pub mod lane;
 pub mod law;
+pub mod maxwell_zener;
+pub mod mindlin;
+pub mod observe;
+pub mod pass;
 pub mod registry;
+pub mod rolling;
+pub mod shear;
+pub mod slider;
+#[cfg(test)]
+mod testing;

@@ -1,6 +1,75 @@
 //! What contact laws exist: names, parameters, memory, how each is built. One line per law.
 
-use crate::config::MaxwellBranch;
+use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
+pub use super::documentation::table_markdown;
+use super::shear::ShearSprings;
+use super::{hertz, maxwell_zener, mindlin, rolling};
+use crate::config::{MaxwellBranch, PairConfig};
+
+/// From one line per law, the list of laws and the match that builds them. A law's module holds
+/// `ENTRY` and `build`.
+macro_rules! register {
+    (normal: $($normal:ident)*; tangential: $($tangential:ident)*; rolling: $($rolling:ident)*;) => {
+        static LAWS: &[LawEntry] = &[$($normal::ENTRY,)* $($tangential::ENTRY,)* $($rolling::ENTRY,)*];
+
+        /// Builds the pair's normal law and hands it to the visitor.
+        pub(super) fn build_normal<V: NormalVisitor>(pair: &PairConfig, visitor: V) -> V::Output {
+            match pair.normal.law.name {
+                $(name if name == $normal::ENTRY.name => $normal::build(pair, visitor),)*
+                name => panic!("the registry has no normal law {name}"),
+            }
+        }
+
+        /// Builds the tangential law `choice` and hands it to the visitor.
+        pub(super) fn build_tangential<V: TangentialVisitor, const SPRINGS: usize>(
+            pair: &PairConfig,
+            choice: &LawChoice,
+            shear: &ShearSprings<SPRINGS>,
+            visitor: V,
+        ) -> V::Output {
+            match choice.law.name {
+                $(name if name == $tangential::ENTRY.name => $tangential::build(pair, choice, shear, visitor),)*
+                name => panic!("the registry has no tangential law {name}"),
+            }
+        }
+
+        /// Builds the rolling law `choice` and hands it to the visitor.
+        pub(super) fn build_rolling<V: RollingVisitor>(pair: &PairConfig, choice: &LawChoice, visitor: V) -> V::Output {
+            match choice.law.name {
+                $(name if name == $rolling::ENTRY.name => $rolling::build(pair, choice, visitor),)*
+                name => panic!("the registry has no rolling law {name}"),
+            }
+        }
+    };
+}
+
+register! {
+    normal:
+        hertz
+        maxwell_zener;
+    tangential:
+        mindlin;
+    rolling:
+        rolling;
+}
+
+/// Every law: normal, tangential, then rolling ones.
+#[must_use]
+pub fn laws() -> &'static [LawEntry] {
+    LAWS
+}
+
+/// The law of this name in this role.
+#[must_use]
+pub fn find(role: Role, name: &str) -> Option<&'static LawEntry> {
+    LAWS.iter().find(|law| law.role == role && law.name == name)
+}
+
+/// The names of the laws in this role, in the order of the registry.
+#[must_use]
+pub fn names(role: Role) -> Vec<&'static str> {
+    LAWS.iter().filter(|law| law.role == role).map(|law| law.name).collect()
+}
 
 /// Kind and range of a law's parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +146,14 @@ pub struct LawChoice {
     pub law: &'static LawEntry,
     /// One value per entry of `law.parameters`.
     pub values: Vec<ParameterValue>,
+}
+
+impl LawEntry {
+    /// This law with every parameter at its default.
+    #[must_use]
+    pub fn with_defaults(&'static self) -> LawChoice {
+        LawChoice { law: self, values: self.parameters.iter().map(|parameter| parameter.default).collect() }
+    }
 }
 
 impl LawChoice {

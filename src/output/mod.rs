@@ -1,1 +1,11 @@
-//! (module output)
+//! What a run leaves behind: tables, snapshots, checkpoints, plots, the terminal. Reads the state
+//! that it is given; never changes it.
+
+pub mod checkpoint;
+pub mod digest;
+mod files;
+pub mod hdf5_file;
+pub mod history;
+pub mod log;
+pub mod plot;
+pub mod snapshot;

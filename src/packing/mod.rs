@@ -1,1 +1,154 @@
-//! (module packing)
+//! Initial state: sizes, positions and velocities of all particles, by id. Made by one process, serially
+//! and from counter-based random numbers; knows nothing of ranks.
+
+pub mod file;
+pub mod grid;
+pub mod overlap;
+pub mod radii;
+pub mod random;
+pub mod rcp;
+pub mod tournament;
+
+#[cfg(test)]
+mod test_input;
+
+use crate::config::{Boundary, CellConfig, Config, PackingConfig, Species};
+use crate::error::{Error, Result};
+use crate::state::{LEDGER, ParticleState};
+use grid::{Ball, Cell};
+use random::{Draws, Purpose};
+
+pub use overlap::check_overlaps;
+
+/// The cell and all its particles at time 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Packing {
+    /// Sides of the cell \[m\].
+    pub sides: [f64; 3],
+    /// Particles in the order of their ids, positions wrapped into the cell.
+    pub particles: Vec<ParticleState>,
+}
+
+/// Make the packing that the input describes, and check it for overlaps.
+///
+/// # Errors
+/// [`Error::Packing`] if the input gives no particle, the solid fraction or the sides cannot be met,
+/// or particles overlap; [`Error::File`] if a particle file cannot be used.
+pub fn build(config: &Config) -> Result<Packing> {
+    let packing = match &config.packing {
+        PackingConfig::RandomClose { contraction_rate, max_moves_per_particle } => {
+            random_close(config, *contraction_rate, *max_moves_per_particle)?
+        }
+        PackingConfig::File { path } => from_file(config, path)?,
+    };
+    if packing.particles.is_empty() {
+        return Err(Error::Packing("there are no particles; give a species a count above 0".into()));
+    }
+    if packing.particles.len() > MAX_PARTICLES {
+        return Err(Error::Packing(format!(
+            "{} particles are more than ids can number ({MAX_PARTICLES}); reduce the counts",
+            packing.particles.len()
+        )));
+    }
+    let balls: Vec<Ball> = packing
+        .particles
+        .iter()
+        .map(|particle| Ball { position: particle.position, radius: particle.radius })
+        .collect();
+    let cell = Cell { sides: packing.sides, periodic: periodic_axes(&config.cell) };
+    check_overlaps(&balls, &cell, config.max_overlap_fraction)?;
+    Ok(packing)
+}
+
+/// Ids are 32 bits wide and walls are numbered after the particles.
+const MAX_PARTICLES: usize = u32::MAX as usize - 16;
+
+fn periodic_axes(cell: &CellConfig) -> [bool; 3] {
+    cell.boundary.map(|boundary| boundary == Boundary::Periodic)
+}
+
+fn random_close(config: &Config, contraction_rate: f64, max_moves_per_particle: f64) -> Result<Packing> {
+    let sized = radii::draw_radii(config.seed, &config.species)?;
+    if sized.is_empty() {
+        return Err(Error::Packing("there are no particles to pack; give a species a count above 0".into()));
+    }
+    let radii: Vec<f64> = sized.iter().map(|one| one.radius).collect();
+    let shape = Cell { sides: config.cell.sides.unwrap_or(config.cell.aspect), periodic: periodic_axes(&config.cell) };
+    let solid_fraction = if config.cell.sides.is_some() {
+        Some(rcp::solid_volume(&radii) / shape.volume())
+    } else {
+        config.cell.solid_fraction
+    };
+    let packed = rcp::pack(&rcp::Request {
+        radii: &radii,
+        shape,
+        solid_fraction,
+        seed: config.seed,
+        contraction_rate,
+        max_moves_per_particle,
+    })?;
+    let sides = config.cell.sides.unwrap_or(packed.sides);
+    let particles = sized
+        .iter()
+        .zip(&packed.positions)
+        .enumerate()
+        .map(|(id, (one, position))| {
+            let position = [0, 1, 2].map(|k| rcp::wrap(position[k], sides[k]));
+            at_rest_in_its_species(config, id, one.species, position, one.radius)
+        })
+        .collect();
+    Ok(Packing { sides, particles })
+}
+
+fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
+    let sides = config.cell.sides.ok_or_else(|| {
+        Error::Packing(format!(
+            "particles from {} need a cell of given sides; set the sides of the cell",
+            path.display()
+        ))
+    })?;
+    let cell = Cell { sides, periodic: periodic_axes(&config.cell) };
+    let names: Vec<&str> = config.species.iter().map(|species| species.name.as_str()).collect();
+    let particles = file::read(path, &names, &cell)?
+        .into_iter()
+        .enumerate()
+        .map(|(id, row)| {
+            let mut particle = at_rest_in_its_species(config, id, row.species, row.position, row.radius);
+            particle.velocity = row.velocity.unwrap_or(particle.velocity);
+            particle.spin = row.spin.unwrap_or(particle.spin);
+            particle
+        })
+        .collect();
+    Ok(Packing { sides, particles })
+}
+
+/// A particle with the initial velocity and spin of its species and nothing behind it.
+fn at_rest_in_its_species(config: &Config, id: usize, species: u32, position: [f64; 3], radius: f64) -> ParticleState {
+    let of_species = &config.species[species as usize];
+    ParticleState {
+        id: id as u32,
+        species,
+        position,
+        radius,
+        velocity: initial_velocity(config.seed, id, of_species),
+        acceleration: [0.0; 3],
+        spin: of_species.spin,
+        angular_acceleration: [0.0; 3],
+        orientation: [1.0, 0.0, 0.0, 0.0],
+        ledger: [0.0; LEDGER.len()],
+        image: [0; 3],
+        reserved: 0,
+    }
+}
+
+/// The species' velocity plus a normal deviate per component \[m/s\].
+fn initial_velocity(seed: u64, id: usize, species: &Species) -> [f64; 3] {
+    if species.velocity_deviation == 0.0 {
+        return species.velocity;
+    }
+    let mut draws = Draws::new(seed, Purpose::Velocity, id as u64);
+    species.velocity.map(|component| component + species.velocity_deviation * draws.normal())
+}
+
+#[cfg(test)]
+mod tests;

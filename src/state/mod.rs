@@ -78,6 +78,19 @@ impl ContactMemory {
         self.values.extend_from_slice(row);
     }
 
+    /// Sorted by key, with equal keys (copies of one contact) once.
+    #[must_use]
+    pub fn sorted_without_copies(&self) -> Self {
+        let mut order: Vec<u32> = (0..self.keys.len() as u32).collect();
+        order.sort_unstable_by_key(|row| self.keys[*row as usize]);
+        order.dedup_by_key(|row| self.keys[*row as usize]);
+        let mut sorted = Self::new(self.width);
+        for row in order {
+            sorted.push(self.keys[row as usize], self.row(row as usize));
+        }
+        sorted
+    }
+
     /// Row `index`.
     #[must_use]
     pub fn row(&self, index: usize) -> &[f64] {
@@ -112,6 +125,8 @@ pub struct GlobalState {
     pub stage_start_strain: [f64; 3],
     /// Step at which the current stage began.
     pub stage_start_step: u64,
+    /// Measured stress when the current stage began \[Pa\].
+    pub stage_start_stress: [f64; 3],
     /// Number of history rows written.
     pub history_rows: u64,
     /// Number of snapshots written.

@@ -126,6 +126,24 @@ impl Particles {
         self.id.is_empty()
     }
 
+    /// Put the owned particles into a new order (no ghosts may be there).
+    pub fn reorder(&mut self, order: &[u32]) {
+        fn permuted<T: Copy>(values: &[T], order: &[u32]) -> Vec<T> {
+            order.iter().map(|index| values[*index as usize]).collect()
+        }
+        debug_assert_eq!(order.len(), self.len());
+        self.id = permuted(&self.id, order);
+        self.species = permuted(&self.species, order);
+        self.record = permuted(&self.record, order);
+        self.image = permuted(&self.image, order);
+        self.velocity = permuted(&self.velocity, order);
+        self.acceleration = permuted(&self.acceleration, order);
+        self.spin = permuted(&self.spin, order);
+        self.angular_acceleration = permuted(&self.angular_acceleration, order);
+        self.orientation = permuted(&self.orientation, order);
+        self.ledger = permuted(&self.ledger, order);
+    }
+
     /// Forget the ghosts.
     pub fn drop_ghosts(&mut self) {
         self.id.truncate(self.owned);

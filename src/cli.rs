@@ -1,0 +1,181 @@
+//! The command line as typed, and what each subcommand calls.
+
+use crate::bench::{self, BenchOptions};
+use crate::config::{self, Config, ConfigOptions};
+use crate::error::{Error, Result};
+use crate::exchange::{Communicator, agree};
+use crate::output::{checkpoint, plot};
+use crate::run::{self, Outcome, RunOptions};
+use crate::verify;
+use clap::{Args, Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Exit code of a run that wrote a checkpoint on SIGUSR1 and wants to be queued again (EX_TEMPFAIL).
+pub const EXIT_REQUEUE: i32 = 75;
+/// Exit code of wrong input or usage.
+pub const EXIT_INPUT: i32 = 2;
+
+/// Discrete element method for battery electrodes and granular matter.
+///
+/// `dem-mpi CONFIG` runs a simulation; put `mpirun -n N` in front for N ranks.
+#[derive(Debug, Parser)]
+#[command(version, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArguments,
+}
+
+#[derive(Debug, Args)]
+struct RunArguments {
+    /// Configuration file (TOML).
+    #[arg(required = true)]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    input: InputArguments,
+    /// Go on from a checkpoint file, or from the newest valid checkpoint of a run directory.
+    #[arg(long, value_name = "FILE|DIR")]
+    restart: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+struct InputArguments {
+    /// Set a key of the configuration, for example `--set stage.0.duration="2 s"`.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Run directory.
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Threads per rank.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Validate a configuration and print the pre-run sheet.
+    Check {
+        /// Configuration file (TOML).
+        config: PathBuf,
+        #[command(flatten)]
+        input: InputArguments,
+    },
+    /// Print a commented example configuration.
+    Init,
+    /// Print the input reference as Markdown.
+    Reference,
+    /// Draw the plots of a run directory.
+    Plot {
+        /// Run directory.
+        directory: PathBuf,
+    },
+    /// Print the digest of the latest state of a run directory, or of a checkpoint.
+    Digest {
+        /// Run directory or checkpoint file.
+        path: PathBuf,
+    },
+    /// Run the analytic cases and print claim, expected, got, pass or fail.
+    Verify {
+        /// Run only the cases whose name contains this.
+        filter: Option<String>,
+    },
+    /// Measure speed: particle-steps/s on a jammed periodic packing.
+    Bench(BenchOptions),
+}
+
+impl InputArguments {
+    fn load(&self, path: &Path) -> Result<Config> {
+        config::load(
+            path,
+            &ConfigOptions {
+                overrides: self.set.clone(),
+                output: self.output.clone(),
+                threads: self.threads.map(usize::from),
+            },
+        )
+    }
+}
+
+/// Parse the command line, do what it says, and return the exit code.
+#[must_use]
+pub fn main() -> i32 {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are no errors; clap prints each to the right stream.
+            let _ = error.print();
+            return error.exit_code();
+        }
+    };
+    let command = match arguments.command {
+        Some(command) => command,
+        None => return parallel(|comm| run_command(comm, &arguments.run)),
+    };
+    let done = match command {
+        Command::Check { config, input } => input.load(&config).map(|config| print!("{}", config::sheet::sheet(&config))),
+        Command::Init => {
+            print!("{}", config::example());
+            Ok(())
+        }
+        Command::Reference => {
+            print!("{}", config::reference_markdown());
+            Ok(())
+        }
+        Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
+            for file in files {
+                println!("{}", file.display());
+            }
+        }),
+        Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
+        Command::Verify { filter } => return verify::main(filter.as_deref()),
+        Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
+    };
+    match done {
+        Ok(()) => 0,
+        Err(error) => report(&error),
+    }
+}
+
+/// Print an error and give its exit code.
+fn report(error: &Error) -> i32 {
+    eprintln!("dem-mpi: {error}");
+    if matches!(error, Error::Input(_)) { EXIT_INPUT } else { 1 }
+}
+
+/// Run on all ranks; every rank returns the largest exit code, rank 0 prints the error.
+fn parallel(work: impl FnOnce(&Communicator) -> Result<i32>) -> i32 {
+    let comm = match Communicator::world() {
+        Ok(comm) => comm,
+        Err(error) => return report(&error),
+    };
+    let code = match work(&comm) {
+        Ok(code) => code,
+        Err(error) if comm.rank() == 0 => report(&error),
+        Err(error) => {
+            if matches!(error, Error::Input(_)) {
+                EXIT_INPUT
+            } else {
+                1
+            }
+        }
+    };
+    comm.sleep_until_all();
+    let mut codes = [f64::from(code)];
+    comm.max_f64(&mut codes);
+    codes[0] as i32
+}
+
+fn run_command(comm: &Communicator, arguments: &RunArguments) -> Result<i32> {
+    let Some(path) = &arguments.config else {
+        return Err(Error::Input("no configuration file given; see `dem-mpi --help`".into()));
+    };
+    let config = Arc::new(agree(comm, arguments.input.load(path))?);
+    let outcome = run::run(comm, &config, &RunOptions { restart: arguments.restart.clone() })?;
+    Ok(match outcome {
+        Outcome::Finished => 0,
+        Outcome::Requeue => EXIT_REQUEUE,
+        Outcome::Stopped(signal) => 128 + signal,
+    })
+}

@@ -1,0 +1,6 @@
+//! Which contacts exist and their memory: lists, order of summation, image shifts. Knows nothing of
+//! forces beyond the width of the memory.
+
+pub mod build;
+pub mod list;
+pub mod shift;

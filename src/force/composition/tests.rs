@@ -1,0 +1,191 @@
+//! Lanes give the scalar bits for every law and every choice; the chain builds what the input names.
+
+use super::*;
+use crate::config::MaxwellBranch;
+use crate::force::lane::Portable8;
+use crate::force::registry::{LawChoice, ParameterKind, ParameterValue, Role, laws};
+use crate::force::testing::{choice, pair, properties};
+use proptest::prelude::*;
+
+const STEPS: usize = 4;
+
+fn with_branches(count: usize) -> PairConfig {
+    let branches =
+        (0..count).map(|k| MaxwellBranch { modulus: 1e8 * (1 + k) as f64, relaxation_time: 1e-3 * (1 + k) as f64 });
+    let name = if count == 0 { "hertz" } else { "maxwell_zener" };
+    pair(properties(1e9, 0.3, branches.collect()), choice(Role::Normal, name, &[]))
+}
+
+/// Every combination of a law's choices and flags.
+fn variants(law: LawChoice) -> Vec<LawChoice> {
+    let mut all = vec![law];
+    for (k, spec) in all[0].law.parameters.iter().enumerate() {
+        let values: Vec<ParameterValue> = match spec.kind {
+            ParameterKind::Choice(words) => (0..words.len()).map(ParameterValue::Choice).collect(),
+            ParameterKind::Flag => [true, false].map(ParameterValue::Flag).to_vec(),
+            ParameterKind::Number { min, .. } => vec![spec.default, ParameterValue::Number(min)],
+        };
+        all = all
+            .iter()
+            .flat_map(|law| {
+                values.iter().map(move |&value| {
+                    let mut law = law.clone();
+                    law.values[k] = value;
+                    law
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+/// Every pair that the registry can build: branch counts × choices × tangential and rolling parts.
+fn every_pair() -> Vec<PairConfig> {
+    let choices = |role| {
+        let some = laws().iter().filter(move |law| law.role == role).flat_map(|law| variants(law.with_defaults()));
+        std::iter::once(None).chain(some.map(Some)).collect::<Vec<_>>()
+    };
+    let (tangential, rolling) = (choices(Role::Tangential), choices(Role::Rolling));
+    let mut pairs = Vec::new();
+    for count in 0..=8 {
+        let base = with_branches(count);
+        for normal in variants(base.normal.clone()) {
+            for tangential in &tangential {
+                for rolling in &rolling {
+                    let (tangential, rolling) = (tangential.clone(), rolling.clone());
+                    pairs.push(PairConfig { normal: normal.clone(), tangential, rolling, ..base.clone() });
+                }
+            }
+        }
+    }
+    pairs
+}
+
+/// Eight touches, several steps each: overlap, rate, and the vectors in units of their own.
+type Numbers = Vec<[f64; 15]>;
+
+fn touch(n: &[f64; 15]) -> Touch<f64> {
+    let direction = [n[2] + 0.1, n[3], n[4]];
+    let length = (direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]).sqrt();
+    let normal = direction.map(|c| c / length);
+    let slip = [n[5], n[6], n[7]];
+    let along = slip[0] * normal[0] + slip[1] * normal[1] + slip[2] * normal[2];
+    Touch {
+        overlap: 1e-6 * (n[0].abs() + 1e-3),
+        overlap_rate: n[1],
+        effective_radius: 1e-3 * (n[14].abs() + 0.1),
+        effective_mass: 1e-6 * (n[13].abs() + 0.1),
+        normal,
+        slip_velocity: std::array::from_fn(|k| slip[k] - along * normal[k]),
+        relative_spin: [1e3 * n[8], 1e3 * n[9], 1e3 * n[10]],
+        mean_spin: [1e3 * n[11], 1e3 * n[12], 1e3 * n[13]],
+    }
+}
+
+fn gather(touches: &[Touch<f64>]) -> Touch<Portable8> {
+    let lanes = |f: &dyn Fn(&Touch<f64>) -> f64| Portable8(std::array::from_fn(|k| f(&touches[k])));
+    let vector = |f: &dyn Fn(&Touch<f64>) -> [f64; 3]| std::array::from_fn(|c| lanes(&|t| f(t)[c]));
+    Touch {
+        overlap: lanes(&|t| t.overlap),
+        overlap_rate: lanes(&|t| t.overlap_rate),
+        effective_radius: lanes(&|t| t.effective_radius),
+        effective_mass: lanes(&|t| t.effective_mass),
+        normal: vector(&|t| t.normal),
+        slip_velocity: vector(&|t| t.slip_velocity),
+        relative_spin: vector(&|t| t.relative_spin),
+        mean_spin: vector(&|t| t.mean_spin),
+    }
+}
+
+/// All numbers of a response, in a fixed order.
+fn numbers<L: Lane>(r: &ContactResponse<L>) -> Vec<L> {
+    let e = &r.energies;
+    let energies = [e.elastic, e.viscoelastic, e.damping, e.viscous, e.friction, e.plastic];
+    [&[r.normal_force, r.stiffness][..], &r.tangential_force, &r.moment, &energies].concat()
+}
+
+struct CompareLanes<'a>(&'a Numbers);
+
+impl LawVisitor for CompareLanes<'_> {
+    type Output = Result<(), String>;
+    fn visit<C: ContactLaw>(self, mut law: C) -> Result<(), String> {
+        law.prepare(1e-5);
+        let mut wide = [Portable8::splat(0.0); MAX_MEMORY];
+        let mut narrow = [[0.0; MAX_MEMORY]; 8];
+        for step in self.0.chunks(8) {
+            let touches: Vec<Touch<f64>> = step.iter().map(touch).collect();
+            let together = numbers(&law.evaluate(&gather(&touches), &mut wide[..C::MEMORY]));
+            for lane in 0..8 {
+                let alone = numbers(&law.evaluate(&touches[lane], &mut narrow[lane][..C::MEMORY]));
+                let memory = (0..C::MEMORY).map(|k| (wide[k].0[lane], narrow[lane][k]));
+                let values = together.iter().map(|v| v.0[lane]).zip(alone).chain(memory);
+                for (index, (a, b)) in values.enumerate() {
+                    if a.to_bits() != b.to_bits() || !a.is_finite() {
+                        return Err(format!("lane {lane}, number {index}: {a:e} and {b:e}"));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn eight_lanes_give_the_scalar_bits_for_every_law_and_choice(
+        numbers in prop::collection::vec(prop::array::uniform15(-1.0..1.0f64), 8 * STEPS)
+    ) {
+        for pair in every_pair() {
+            let result = visit(&pair, CompareLanes(&numbers));
+            prop_assert!(result.is_ok(), "{result:?} for {pair:?}");
+        }
+    }
+}
+
+/// Memory columns, TANGENTIAL, ROLLING, and the response to one touch with slip and spin.
+struct Describe;
+
+impl LawVisitor for Describe {
+    type Output = (Vec<Column>, usize, bool, bool, ContactResponse<f64>);
+    fn visit<C: ContactLaw>(self, mut law: C) -> Self::Output {
+        law.prepare(1e-5);
+        let mut memory = [0.0; MAX_MEMORY];
+        let numbers = std::array::from_fn(|k| 0.1 + 0.05 * k as f64);
+        let response = law.evaluate(&touch(&numbers), &mut memory[..C::MEMORY]);
+        (law.columns(), C::MEMORY, C::TANGENTIAL, C::ROLLING, response)
+    }
+}
+
+#[test]
+fn columns_are_as_many_as_the_memory_and_have_different_names() {
+    for pair in every_pair() {
+        let (columns, memory, tangential, rolling, _) = visit(&pair, Describe);
+        let mut names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names.len(), memory);
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), memory, "{columns:?}");
+        assert_eq!((tangential, rolling), (pair.tangential.is_some(), pair.rolling.is_some()));
+    }
+}
+
+#[test]
+fn a_frictionless_composition_returns_no_tangential_force_and_no_moment() {
+    for pair in every_pair().iter().filter(|pair| pair.tangential.is_none() && pair.rolling.is_none()) {
+        let (.., response) = visit(pair, Describe);
+        assert_eq!(response.tangential_force, [0.0; 3]);
+        assert_eq!(response.moment, [0.0; 3]);
+        assert!(response.normal_force > 0.0);
+    }
+}
+
+#[test]
+fn a_pair_without_friction_coefficient_returns_no_tangential_force() {
+    let mut pair = with_branches(2);
+    pair.properties.friction = 0.0;
+    pair.tangential = Some(choice(Role::Tangential, "mindlin", &[]));
+    let (.., response) = visit(&pair, Describe);
+    assert_eq!(response.tangential_force, [0.0; 3]);
+}

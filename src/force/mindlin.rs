@@ -1,0 +1,192 @@
+//! Mindlin–Deresiewicz tangential law in increments, elastic or relaxing with the normal law's branches.
+
+use super::composition::TangentialVisitor;
+use super::lane::{Lane, Vector, add, dot, scale, sub};
+use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorResponse};
+use super::maxwell_zener::mean_decay;
+use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
+use super::shear::ShearSprings;
+use super::slider::{Turning, carried_share_of_vector, coulomb_limit, kept_share, stiffness_loss};
+use crate::config::PairConfig;
+
+/// Registry entry.
+pub const ENTRY: LawEntry = LawEntry {
+    name: "mindlin",
+    role: Role::Tangential,
+    summary: "Mindlin increments with Coulomb friction; relaxes along with a Maxwell-Zener normal law",
+    source: "W (3.4), (3.5), (3.9) with erratum",
+    parameters: &[FACTOR, DAMPING],
+    check: |_| Ok(()),
+};
+
+const FACTOR: ParameterSpec = ParameterSpec {
+    name: "factor",
+    kind: ParameterKind::Number { min: 1e-6, max: 1.0 },
+    default: ParameterValue::Number(2.0 / 3.0),
+    doc: "factor on the tangential stiffness 8 G_eff a: 2/3 (W), 1 (incremental Mindlin)",
+};
+
+const DAMPING: ParameterSpec = ParameterSpec {
+    name: "damping",
+    kind: ParameterKind::Flag,
+    default: ParameterValue::Flag(true),
+    doc: "tangential dashpot with the damping ratio of the normal one",
+};
+
+/// Mindlin spring, dashpot and Coulomb slider: `ΔF = f · 8 G_eff a Δδ_t`, `|F_t| ≤ μ F_n`.
+///
+/// a \[m\] contact radius of the normal law, G_eff \[Pa\], Δδ_t = v_t Δt \[m\] tangential displacement of j
+/// relative to i, f the parameter `factor`; F_t acts on i, −F_t on j. With a relaxing normal law the
+/// spring is a set in parallel, one spring per Maxwell branch with the branch's τ_k and the long-term one:
+/// `F_k ← F_k e^{−x} + f · 8 G_k a Δδ_t (1−e^{−x})/x`, x = Δt/τ_k.
+///
+/// - Memory: the spring vectors, each *half an increment ahead* of the touch: the force at time t is
+///   the stored one plus half of this step's increment (trapezoidal rule), so that a sticking contact
+///   neither gains nor loses energy at first order in Δt; and the contact radius of the last step.
+/// - The stored vectors turn with the contact ([`Turning`]); where a decreases they shrink with it, so
+///   that unloading creates no energy.
+/// - Slider: the spring force is cut to μ F_n, F_n after clipping (all springs by the same share), and so
+///   is the sum with the dashpot.
+/// - Dashpot: `c_t = c_n √(f · 8 G_eff/(2 E_eff))`, c_n the normal law's: the same damping ratio on the
+///   tangential stiffness.
+///
+/// Energies: springs `½ F_k²/k_k`; friction is slip times the carried force, and what the springs lose as a
+/// changes (micro-slip); the dashpot's is never negative (the cut is a projection on a ball).
+///
+/// # Source
+/// W (3.4), (3.5); (3.9) with the erratum on G_eff.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mindlin<const SPRINGS: usize> {
+    /// f · 8 G_k \[Pa\].
+    modulus: [f64; SPRINGS],
+    rate: [f64; SPRINGS],
+    decay: [f64; SPRINGS],
+    weight: [f64; SPRINGS],
+    friction: f64,
+    /// c_t/c_n, 0 without dashpot.
+    dashpot_ratio: f64,
+    time_step: f64,
+}
+
+impl<const SPRINGS: usize> Mindlin<SPRINGS> {
+    /// From the law's parameters, the shear springs that go with the normal law and the pair's Coulomb
+    /// friction coefficient.
+    #[must_use]
+    pub fn new(choice: &LawChoice, shear: &ShearSprings<SPRINGS>, friction: f64) -> Self {
+        let factor = choice.number(FACTOR.name);
+        let damping = choice.flag(DAMPING.name);
+        Self {
+            modulus: shear.modulus.map(|modulus| factor * 8.0 * modulus),
+            rate: shear.rate,
+            decay: [1.0; SPRINGS],
+            weight: [1.0; SPRINGS],
+            friction,
+            dashpot_ratio: if damping { (4.0 * factor * shear.shear_to_young).sqrt() } else { 0.0 },
+            time_step: 0.0,
+        }
+    }
+
+    /// The cut sum of spring force and dashpot.
+    #[inline(always)]
+    fn with_dashpot<L: Lane>(&self, spring: Vector<L>, touch: &Touch<L>, coefficient: L, limit: L) -> Vector<L> {
+        if self.dashpot_ratio == 0.0 {
+            return spring;
+        }
+        let sum = add(spring, scale(touch.slip_velocity, L::splat(self.dashpot_ratio) * coefficient));
+        scale(sum, carried_share_of_vector(sum, limit))
+    }
+}
+
+/// Energy that a branch dissipates in half a step: what it would hold after an elastic half increment from
+/// `before`, less what it holds `after`; 0 for a spring that does not relax.
+#[inline(always)]
+fn relaxation_loss<L: Lane>(before: Vector<L>, half_slip: Vector<L>, after: Vector<L>, stiffness: L) -> L {
+    let elastic = add(before, scale(half_slip, stiffness));
+    L::splat(0.5) * (dot(elastic, elastic) - dot(after, after)) / stiffness
+}
+
+/// Hands the law of a pair to the visitor; `choice` is the pair's tangential choice.
+pub fn build<V: TangentialVisitor, const SPRINGS: usize>(
+    pair: &PairConfig,
+    choice: &LawChoice,
+    shear: &ShearSprings<SPRINGS>,
+    visitor: V,
+) -> V::Output {
+    visitor.visit(Mindlin::new(choice, shear, pair.properties.friction))
+}
+
+impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
+    const MEMORY: usize = 3 * SPRINGS + 1;
+
+    fn columns(&self) -> Vec<Column> {
+        let mut columns = Vec::new();
+        for (k, &rate) in self.rate.iter().enumerate() {
+            let spring = if rate == 0.0 { String::new() } else { format!("branch_{}_", k + 1) };
+            for axis in ["x", "y", "z"] {
+                columns.push(Column { name: format!("tangential_{spring}force_{axis}"), unit: "N" });
+            }
+        }
+        columns.push(Column { name: "tangential_contact_radius".to_owned(), unit: "m" });
+        columns
+    }
+
+    fn prepare(&mut self, time_step: f64) {
+        self.time_step = time_step;
+        for k in 0..SPRINGS {
+            let x = time_step * self.rate[k];
+            self.decay[k] = libm::exp(-x);
+            self.weight[k] = mean_decay(x);
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
+        let zero = L::splat(0.0);
+        let half = L::splat(0.5);
+        let turning = Turning::new(touch, self.time_step);
+        let radius = normal.contact_radius;
+        let last = memory[3 * SPRINGS];
+        let kept = kept_share(radius, last);
+        let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
+        let limit = coulomb_limit(self.friction, normal.force);
+        let mut energies = Energies::zero();
+
+        let mut trial = [[zero; 3]; SPRINGS];
+        let mut load = [zero; 3];
+        for k in 0..SPRINGS {
+            let stiffness = L::splat(self.modulus[k]) * radius;
+            let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
+            let carried = scale(turning.apply(stored), kept);
+            trial[k] = add(carried, scale(half_slip, stiffness * L::splat(self.weight[k])));
+            load = add(load, trial[k]);
+            let last_stiffness = L::splat(self.modulus[k]) * last;
+            let shrunk = stiffness_loss(dot(stored, stored), last_stiffness, dot(carried, carried), stiffness);
+            energies.friction = energies.friction + shrunk;
+            energies.viscous = energies.viscous + relaxation_loss(carried, half_slip, trial[k], stiffness);
+        }
+
+        let share = carried_share_of_vector(load, limit);
+        let slipped = share * (L::splat(1.0) - share);
+        for k in 0..SPRINGS {
+            let stiffness = L::splat(self.modulus[k]) * radius;
+            let force = scale(trial[k], share);
+            let advance = scale(half_slip, stiffness * L::splat(self.weight[k]));
+            let ahead = add(scale(force, L::splat(self.decay[k])), advance);
+            [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]] = ahead;
+            let held = half * dot(force, force) / stiffness;
+            if self.rate[k] == 0.0 {
+                energies.elastic = energies.elastic + held;
+            } else {
+                energies.viscoelastic = energies.viscoelastic + held;
+            }
+            energies.friction = energies.friction + slipped * dot(trial[k], trial[k]) / stiffness;
+            energies.viscous = energies.viscous + relaxation_loss(force, half_slip, ahead, stiffness);
+        }
+        memory[3 * SPRINGS] = radius;
+
+        let spring = scale(load, share);
+        let value = self.with_dashpot(spring, touch, normal.dashpot, limit);
+        energies.damping = dot(sub(value, spring), touch.slip_velocity) * L::splat(self.time_step);
+        VectorResponse { value, energies }
+    }
+}

@@ -1,0 +1,140 @@
+//! What an observing contact pass collects: exact sums for stress and energies, maxima, samples of
+//! single contacts. Sums are exact, so that no order of ranks, threads or lists shows in them.
+
+use super::law::Energies;
+use crate::exchange::exact_sum::ExactSum;
+
+/// Names the places in [`Observation::sums`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Sum {
+    /// Σ F⊗d, six components from here: xx, yy, zz, xy, xz, yz \[N m\].
+    Virial = 0,
+    /// Σ n⊗n, six components from here.
+    Fabric = 6,
+    /// Σ |F| over contacts \[N\].
+    ForceMagnitude = 12,
+    /// Energy in springs \[J\].
+    Elastic = 13,
+    /// Energy in Maxwell branches \[J\].
+    Viscoelastic = 14,
+    /// Number of touching contacts between particles.
+    Contacts = 15,
+    /// Number of touching contacts with walls.
+    WallContacts = 16,
+    /// Normal force on each of the six walls \[N\], from here.
+    WallForce = 17,
+}
+
+/// Number of exact sums.
+pub const SUMS: usize = 23;
+
+/// Ledger entries that a contact writes: work of the cell, work of driven partners and walls, damping,
+/// viscous, friction, plastic \[J\].
+pub const CONTACT_LEDGER: usize = 6;
+
+/// One touching contact as observed.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample {
+    /// Output line.
+    pub line: usize,
+    /// Branch vector d from first to second \[m\].
+    pub branch: [f64; 3],
+    /// Unit normal.
+    pub normal: [f64; 3],
+    /// Overlap δ \[m\].
+    pub overlap: f64,
+    /// Force on the second \[N\].
+    pub force: [f64; 3],
+    /// Normal force \[N\].
+    pub normal_force: f64,
+    /// Counted here: the lower id is owned by this rank.
+    pub counted: bool,
+    /// The second is this wall.
+    pub wall: Option<usize>,
+}
+
+/// What to collect.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Wanted {
+    /// Exact sums.
+    pub sums: bool,
+    /// Every touching contact.
+    pub samples: bool,
+    /// Ledger lines.
+    pub ledger: bool,
+}
+
+/// Collected by one pass over some contacts.
+#[derive(Debug, Clone, Default)]
+pub struct Observation {
+    /// See [`Sum`]; empty unless wanted.
+    pub sums: Vec<ExactSum>,
+    /// Largest tangent stiffness \[N/m\].
+    pub max_stiffness: f64,
+    /// Largest overlap over smaller radius.
+    pub max_overlap_ratio: f64,
+    /// Touching contacts; empty unless wanted.
+    pub samples: Vec<Sample>,
+}
+
+impl Observation {
+    /// Ready to collect.
+    #[must_use]
+    pub fn new(wanted: Wanted) -> Self {
+        Self { sums: if wanted.sums { vec![ExactSum::new(); SUMS] } else { Vec::new() }, ..Self::default() }
+    }
+
+    /// Take in one contact.
+    pub fn collect(&mut self, sample: &Sample, energies: &Energies<f64>, wanted: Wanted) {
+        if wanted.sums && sample.counted {
+            self.add_to_sums(sample, energies);
+        }
+        if wanted.samples {
+            self.samples.push(*sample);
+        }
+    }
+
+    fn add_to_sums(&mut self, sample: &Sample, energies: &Energies<f64>) {
+        let (f, d, n) = (sample.force, sample.branch, sample.normal);
+        let symmetric = |a: [f64; 3], b: [f64; 3]| {
+            [
+                a[0] * b[0],
+                a[1] * b[1],
+                a[2] * b[2],
+                0.5 * (a[0] * b[1] + a[1] * b[0]),
+                0.5 * (a[0] * b[2] + a[2] * b[0]),
+                0.5 * (a[1] * b[2] + a[2] * b[1]),
+            ]
+        };
+        for (k, value) in symmetric(f, d).into_iter().enumerate() {
+            self.sums[Sum::Virial as usize + k].add(value);
+        }
+        self.sums[Sum::Elastic as usize].add(energies.elastic);
+        self.sums[Sum::Viscoelastic as usize].add(energies.viscoelastic);
+        self.sums[Sum::ForceMagnitude as usize].add((f[0] * f[0] + f[1] * f[1] + f[2] * f[2]).sqrt());
+        if let Some(wall) = sample.wall {
+            self.sums[Sum::WallContacts as usize].add(1.0);
+            self.sums[Sum::WallForce as usize + wall].add(sample.normal_force);
+            return;
+        }
+        self.sums[Sum::Contacts as usize].add(1.0);
+        for (k, value) in symmetric(n, n).into_iter().enumerate() {
+            self.sums[Sum::Fabric as usize + k].add(value);
+        }
+    }
+
+    /// Join what two passes collected.
+    pub fn merge(&mut self, mut other: Self) {
+        if self.sums.is_empty() {
+            self.sums = other.sums;
+        } else {
+            for (sum, more) in self.sums.iter_mut().zip(&other.sums) {
+                sum.merge(more);
+            }
+        }
+        self.max_stiffness = self.max_stiffness.max(other.max_stiffness);
+        self.max_overlap_ratio = self.max_overlap_ratio.max(other.max_overlap_ratio);
+        self.samples.append(&mut other.samples);
+    }
+}

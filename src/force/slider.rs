@@ -1,0 +1,72 @@
+//! What the spring–slider laws share: a stored vector that follows the contact, and the Coulomb limit.
+
+use super::lane::{Lane, Vector, add, cross, dot, scale, sub};
+use super::law::Touch;
+
+/// How a vector stored with a contact follows it over one step: projected on the new tangent plane,
+/// turned about n by the pair's mean spin, its length kept.
+#[derive(Debug, Clone, Copy)]
+pub struct Turning<L> {
+    normal: Vector<L>,
+    angle: L,
+}
+
+impl<L: Lane> Turning<L> {
+    /// The turning of one touch over `time_step` \[s\].
+    #[inline(always)]
+    #[must_use]
+    pub fn new(touch: &Touch<L>, time_step: f64) -> Self {
+        Self { normal: touch.normal, angle: dot(touch.mean_spin, touch.normal) * L::splat(time_step) }
+    }
+
+    /// The vector after the step. The angle φ about n is taken as arctan φ (third order in Δt).
+    #[inline(always)]
+    #[must_use]
+    pub fn apply(&self, stored: Vector<L>) -> Vector<L> {
+        let projected = sub(stored, scale(self.normal, dot(stored, self.normal)));
+        let turned = add(projected, scale(cross(self.normal, projected), self.angle));
+        let square = dot(turned, turned);
+        let ratio = (dot(stored, stored) / square).sqrt();
+        scale(turned, L::select(square.greater(L::splat(0.0)), ratio, L::splat(0.0)))
+    }
+}
+
+/// Coulomb limit `coefficient × F_n × arm`, 0 under a tensile force (clipping off).
+#[inline(always)]
+#[must_use]
+pub fn coulomb_limit<L: Lane>(coefficient: f64, normal_force: L) -> L {
+    L::splat(0.0).max(L::splat(coefficient) * normal_force)
+}
+
+/// The share in \[0, 1\] of a load of this magnitude that a slider with this limit carries.
+#[inline(always)]
+#[must_use]
+pub fn carried_share<L: Lane>(magnitude: L, limit: L) -> L {
+    // A comparison with NaN (0/0) is false, which leaves 1.
+    (limit / magnitude).min(L::splat(1.0))
+}
+
+/// Like [`carried_share`] for a vector.
+#[inline(always)]
+#[must_use]
+pub fn carried_share_of_vector<L: Lane>(load: Vector<L>, limit: L) -> L {
+    carried_share(dot(load, load).sqrt(), limit)
+}
+
+/// The share of a spring's force that a shrinking contact keeps, `min(1, stiffness/last stiffness)`, so
+/// that unloading creates no energy; 1 at first touch.
+#[inline(always)]
+#[must_use]
+pub fn kept_share<L: Lane>(stiffness: L, last: L) -> L {
+    (stiffness / last).min(L::splat(1.0))
+}
+
+/// Energy `½ f²/k` that a spring loses when its force goes from `before` (squared, at stiffness `last`) to
+/// `after` (squared, at `stiffness`) without motion; 0 at first touch.
+#[inline(always)]
+#[must_use]
+pub fn stiffness_loss<L: Lane>(before: L, last: L, after: L, stiffness: L) -> L {
+    let zero = L::splat(0.0);
+    let loss = L::splat(0.5) * (before / last - after / stiffness);
+    L::select(last.greater(zero), loss, zero)
+}

@@ -1,0 +1,339 @@
+//! Leap-frog motion of spheres, W (2.1)–(2.4), in a periodic cell that deforms.
+//!
+//! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
+//! half the old one and (2.4) half the new one.
+
+use super::gather::Lines;
+use crate::contact::list::ContactList;
+use crate::state::LEDGER;
+use crate::state::particles::{Particles, Record, synchronised};
+
+/// Particles that one thread takes at least.
+const GRAIN: usize = 1024;
+
+/// What is the same for all particles in one step.
+#[derive(Debug, Clone, Copy)]
+pub struct StepMotion {
+    /// Step that led to the present positions \[s\].
+    pub previous_time_step: f64,
+    /// Step from here to the next positions \[s\].
+    pub time_step: f64,
+    /// Gravity \[m/s²\].
+    pub gravity: [f64; 3],
+    /// Affine factor of the positions per axis (BCT; 1 in BC).
+    pub scale: [f64; 3],
+    /// Cell sides after the step \[m\].
+    pub sides: [f64; 3],
+    /// Cell sides when the reference positions were taken \[m\].
+    pub reference_sides: [f64; 3],
+    /// Velocity of the high faces (BC; zero in BCT): change of velocity of a particle that wraps \[m/s\].
+    pub face_velocity: [f64; 3],
+    /// Periodic axes.
+    pub periodic: [bool; 3],
+    /// Particles turn: integrate spins and orientations.
+    pub rotation: bool,
+    /// Keep the energy ledger.
+    pub ledger: bool,
+    /// Split the work over the threads of the current pool.
+    pub parallel: bool,
+}
+
+/// What a step brings back.
+#[derive(Debug, Default)]
+pub struct StepResult {
+    /// Largest squared displacement since the reference positions, relative to the affine motion of the
+    /// cell \[m²\].
+    pub max_displacement_squared: f64,
+    /// Particles that crossed a periodic face, with the number of images per axis.
+    pub wrapped: Vec<(u32, [i32; 3])>,
+    /// Local index of a particle that left the cell through a wall or is not a number.
+    pub lost: Option<u32>,
+}
+
+impl StepResult {
+    fn merge(mut self, mut other: Self) -> Self {
+        if other.max_displacement_squared > self.max_displacement_squared {
+            self.max_displacement_squared = other.max_displacement_squared;
+        }
+        self.wrapped.append(&mut other.wrapped);
+        self.lost = self.lost.or(other.lost);
+        self
+    }
+}
+
+/// Owned particles `start ..` as slices that threads can split.
+struct Slice<'a> {
+    start: usize,
+    record: &'a mut [Record],
+    image: &'a mut [[i32; 3]],
+    velocity: &'a mut [[f64; 3]],
+    acceleration: &'a mut [[f64; 3]],
+    spin: &'a mut [[f64; 3]],
+    angular_acceleration: &'a mut [[f64; 3]],
+    orientation: &'a mut [[f64; 4]],
+    ledger: &'a mut [[f64; LEDGER.len()]],
+    reference: &'a [[f64; 3]],
+    reference_shift: &'a mut [[i32; 3]],
+}
+
+impl<'a> Slice<'a> {
+    fn split(self, middle: usize) -> (Self, Self) {
+        let (record, record_high) = self.record.split_at_mut(middle);
+        let (image, image_high) = self.image.split_at_mut(middle);
+        let (velocity, velocity_high) = self.velocity.split_at_mut(middle);
+        let (acceleration, acceleration_high) = self.acceleration.split_at_mut(middle);
+        let (spin, spin_high) = self.spin.split_at_mut(middle);
+        let (angular_acceleration, angular_high) = self.angular_acceleration.split_at_mut(middle);
+        let (orientation, orientation_high) = self.orientation.split_at_mut(middle);
+        let (ledger, ledger_high) = self.ledger.split_at_mut(middle);
+        let (reference, reference_high) = self.reference.split_at(middle);
+        let (reference_shift, shift_high) = self.reference_shift.split_at_mut(middle);
+        let low = Slice {
+            start: self.start,
+            record,
+            image,
+            velocity,
+            acceleration,
+            spin,
+            angular_acceleration,
+            orientation,
+            ledger,
+            reference,
+            reference_shift,
+        };
+        let high = Slice {
+            start: self.start + middle,
+            record: record_high,
+            image: image_high,
+            velocity: velocity_high,
+            acceleration: acceleration_high,
+            spin: spin_high,
+            angular_acceleration: angular_high,
+            orientation: orientation_high,
+            ledger: ledger_high,
+            reference: reference_high,
+            reference_shift: shift_high,
+        };
+        (low, high)
+    }
+}
+
+/// Positions at the last list rebuild and the images crossed since.
+#[derive(Debug, Clone, Default)]
+pub struct Reference {
+    /// Positions then \[m\].
+    pub position: Vec<[f64; 3]>,
+    /// Images crossed since then.
+    pub crossed: Vec<[i32; 3]>,
+}
+
+impl Reference {
+    /// Take the present positions of the owned particles.
+    pub fn take(&mut self, particles: &Particles) {
+        self.position.clear();
+        self.position.extend(particles.record[..particles.owned].iter().map(|r| r.position));
+        self.crossed.clear();
+        self.crossed.resize(particles.owned, [0; 3]);
+    }
+}
+
+/// Sum the forces on all owned particles and move them one step.
+pub fn advance(
+    particles: &mut Particles,
+    reference: &mut Reference,
+    list: &ContactList,
+    lines: &Lines,
+    motion: &StepMotion,
+) -> StepResult {
+    let owned = particles.owned;
+    let slice = Slice {
+        start: 0,
+        record: &mut particles.record[..owned],
+        image: &mut particles.image[..owned],
+        velocity: &mut particles.velocity,
+        acceleration: &mut particles.acceleration,
+        spin: &mut particles.spin,
+        angular_acceleration: &mut particles.angular_acceleration,
+        orientation: &mut particles.orientation,
+        ledger: &mut particles.ledger,
+        reference: &reference.position,
+        reference_shift: &mut reference.crossed,
+    };
+    split(slice, list, lines, motion)
+}
+
+fn split(slice: Slice, list: &ContactList, lines: &Lines, motion: &StepMotion) -> StepResult {
+    let count = slice.record.len();
+    if !motion.parallel || count <= GRAIN {
+        return advance_slice(slice, list, lines, motion);
+    }
+    let (low, high) = slice.split(count / 2);
+    let (a, b) = rayon::join(|| split(low, list, lines, motion), || split(high, list, lines, motion));
+    a.merge(b)
+}
+
+fn advance_slice(mut slice: Slice, list: &ContactList, lines: &Lines, motion: &StepMotion) -> StepResult {
+    let mut result = StepResult::default();
+    let (old, new) = (motion.previous_time_step, motion.time_step);
+    let kick = 0.5 * (old + new);
+    let drift = [0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new);
+    let stretch = [0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]);
+    for index in 0..slice.record.len() {
+        let load = lines.load_on(list, slice.start + index);
+        let record = &mut slice.record[index];
+        let free = record.inverse_mass > 0.0;
+        let mut acceleration = load.force.map(|f| f * record.inverse_mass);
+        if free {
+            for k in 0..3 {
+                acceleration[k] += motion.gravity[k];
+            }
+        }
+        if motion.ledger {
+            lines.add_ledger(list, slice.start + index, &mut slice.ledger[index]);
+            add_external_work(&mut slice.ledger[index], record, load.force, load.torque, motion, free);
+        }
+        slice.acceleration[index] = acceleration;
+        let velocity = &mut slice.velocity[index];
+        for k in 0..3 {
+            velocity[k] += kick * acceleration[k];
+            record.position[k] = motion.scale[k] * record.position[k] + drift[k] * velocity[k];
+        }
+        if motion.rotation {
+            let inverse_inertia = 2.5 * record.inverse_mass / (record.radius * record.radius);
+            let angular = load.torque.map(|t| t * inverse_inertia);
+            slice.angular_acceleration[index] = angular;
+            let spin = &mut slice.spin[index];
+            for k in 0..3 {
+                spin[k] += kick * angular[k];
+            }
+            slice.orientation[index] = turned(slice.orientation[index], *spin, new);
+            record.spin = synchronised(*spin, angular, new);
+        }
+        wrap(&mut slice, index, motion, &mut result);
+        let record = &mut slice.record[index];
+        record.velocity = synchronised(slice.velocity[index], acceleration, new);
+        let mut squared = 0.0;
+        for k in 0..3 {
+            let unwrapped = record.position[k] + f64::from(slice.reference_shift[index][k]) * motion.sides[k];
+            let moved = unwrapped - stretch[k] * slice.reference[index][k];
+            squared += moved * moved;
+        }
+        if squared > result.max_displacement_squared {
+            result.max_displacement_squared = squared;
+        }
+        if squared.is_nan() {
+            result.lost = Some((slice.start + index) as u32);
+        }
+    }
+    result
+}
+
+/// Bring a particle back into the cell, count the images, and change its velocity with the face (BC).
+#[inline(always)]
+fn wrap(slice: &mut Slice, index: usize, motion: &StepMotion, result: &mut StepResult) {
+    let record = &mut slice.record[index];
+    let mut wraps = [0; 3];
+    for k in 0..3 {
+        let (side, x) = (motion.sides[k], record.position[k]);
+        if x >= 0.0 && x < side {
+            continue;
+        }
+        if !motion.periodic[k] {
+            if x < -record.radius || x > side + record.radius {
+                result.lost = Some((slice.start + index) as u32);
+            }
+            continue;
+        }
+        let (position, crossed) = wrapped(x, side);
+        if crossed.abs() > 1 {
+            result.lost = Some((slice.start + index) as u32);
+        }
+        record.position[k] = position;
+        wraps[k] = crossed;
+        slice.velocity[index][k] -= f64::from(crossed) * motion.face_velocity[k];
+    }
+    if wraps != [0; 3] {
+        for k in 0..3 {
+            slice.image[index][k] += wraps[k];
+            slice.reference_shift[index][k] += wraps[k];
+        }
+        result.wrapped.push(((slice.start + index) as u32, wraps));
+    }
+}
+
+/// Position wrapped into `[0, side)` and the images crossed (+1: left through the high face). Farther
+/// than one side off, the count is 2 or −2: a fault.
+#[inline]
+#[must_use]
+pub fn wrapped(x: f64, side: f64) -> (f64, i32) {
+    if x >= side {
+        let back = x - side;
+        return if back < side { (back, 1) } else { (x, 2) };
+    }
+    if x < 0.0 {
+        let forth = x + side;
+        if forth < 0.0 {
+            return (x, -2);
+        }
+        // A tiny negative x rounds to the side itself, which is the low face.
+        return if forth < side { (forth, -1) } else { (0.0, 0) };
+    }
+    (x, 0)
+}
+
+/// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
+#[inline(always)]
+fn add_external_work(
+    ledger: &mut [f64; LEDGER.len()],
+    record: &Record,
+    force: [f64; 3],
+    torque: [f64; 3],
+    motion: &StepMotion,
+    free: bool,
+) {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    if free {
+        ledger[1] += record.mass * dot(motion.gravity, record.velocity) * motion.time_step;
+    } else {
+        ledger[2] -= (dot(force, record.velocity) + dot(torque, record.spin)) * motion.time_step;
+    }
+}
+
+/// Orientation after turning with an angular velocity for one step: `q + ½ Δt ω q`, normalised.
+#[inline(always)]
+fn turned(q: [f64; 4], spin: [f64; 3], time_step: f64) -> [f64; 4] {
+    let h = 0.5 * time_step;
+    let [x, y, z] = spin.map(|w| w * h);
+    let turned = [
+        q[0] - (x * q[1] + y * q[2] + z * q[3]),
+        q[1] + (x * q[0] + y * q[3] - z * q[2]),
+        q[2] + (y * q[0] + z * q[1] - x * q[3]),
+        q[3] + (z * q[0] + x * q[2] - y * q[1]),
+    ];
+    let norm = (turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3]).sqrt();
+    turned.map(|c| c / norm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrapping_stays_inside_and_counts_images() {
+        assert_eq!(wrapped(1.5, 1.0), (0.5, 1));
+        assert_eq!(wrapped(-0.25, 1.0), (0.75, -1));
+        assert_eq!(wrapped(-1e-20, 1.0), (0.0, 0));
+        assert_eq!(wrapped(1.0, 1.0), (0.0, 1));
+        assert_eq!(wrapped(2.5, 1.0).1, 2);
+        assert_eq!(wrapped(-2.5, 1.0).1, -2);
+    }
+
+    #[test]
+    fn turning_about_z_by_small_steps_gives_the_angle() {
+        let (mut q, steps) = ([1.0, 0.0, 0.0, 0.0], 1000);
+        for _ in 0..steps {
+            q = turned(q, [0.0, 0.0, 1.0], 0.5 / f64::from(steps));
+        }
+        assert!((q[0] - libm::cos(0.25)).abs() < 1e-7 && (q[3] - libm::sin(0.25)).abs() < 1e-7, "{q:?}");
+    }
+}

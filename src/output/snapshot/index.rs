@@ -1,0 +1,147 @@
+//! Names of snapshot files and the two time indices beside them: the JSON series that ParaView opens
+//! and the XDMF sidecar for older readers. Both are replaced atomically.
+
+use crate::error::{Error, Result};
+use crate::output::files::{io_error, write_atomically};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+pub(super) fn particle_file(number: usize) -> String {
+    format!("particles-{number:06}.vtkhdf")
+}
+
+pub(super) fn contact_file(number: usize) -> String {
+    format!("contacts-{number:06}.vtkhdf")
+}
+
+/// Number of a snapshot file, complete or not; `None` for other files.
+pub(super) fn number_of(name: &str) -> Option<usize> {
+    let name = name.strip_suffix(".part").unwrap_or(name).strip_suffix(".vtkhdf")?;
+    let digits = name.strip_prefix("particles-").or_else(|| name.strip_prefix("contacts-"))?;
+    digits.parse().ok()
+}
+
+fn series_name(kind: &str) -> String {
+    format!("{kind}.vtkhdf.series")
+}
+
+/// Index of all snapshots of a kind.
+///
+/// # Errors
+/// [`Error::File`] when it cannot be written.
+pub(super) fn write_series(folder: &Path, kind: &str, times: &[f64], name: fn(usize) -> String) -> Result<()> {
+    let files: Vec<Value> =
+        times.iter().enumerate().map(|(number, time)| json!({"name": name(number), "time": time})).collect();
+    let text = format!("{:#}\n", json!({"file-series-version": "1.0", "files": files}));
+    write_atomically(&folder.join(series_name(kind)), text.as_bytes())
+}
+
+/// Times of the first `count` snapshots.
+///
+/// # Errors
+/// [`Error::File`] when the index is missing, cannot be read or holds fewer.
+pub(super) fn read_times(folder: &Path, count: usize) -> Result<Vec<f64>> {
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let path = folder.join(series_name("particles"));
+    let text = fs::read_to_string(&path).map_err(|error| io_error(&path, "read the index of snapshots", &error))?;
+    let index: Value = serde_json::from_str(&text).unwrap_or_default();
+    let files = index["files"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let times: Vec<f64> = files.iter().map_while(|file| file["time"].as_f64()).take(count).collect();
+    if times.len() < count {
+        let message = format!(
+            "lists {} snapshots where the checkpoint has written {count}; restart into a new output directory",
+            times.len()
+        );
+        return Err(Error::File { path, message });
+    }
+    Ok(times)
+}
+
+/// Cut the existing indices down to these snapshots.
+///
+/// # Errors
+/// [`Error::File`] when one cannot be replaced or removed.
+pub(super) fn keep_first(folder: &Path, times: &[f64]) -> Result<()> {
+    for (kind, name) in [("particles", particle_file as fn(usize) -> String), ("contacts", contact_file)] {
+        let path = folder.join(series_name(kind));
+        if times.is_empty() && path.exists() {
+            fs::remove_file(&path).map_err(|error| io_error(&path, "delete the old index", &error))?;
+        } else if path.exists() {
+            write_series(folder, kind, times, name)?;
+        }
+    }
+    let path = folder.join("particles.xmf");
+    match fs::read_to_string(&path) {
+        Ok(_) if times.is_empty() => {
+            fs::remove_file(&path).map_err(|error| io_error(&path, "delete the old index", &error))
+        }
+        Ok(text) => write_atomically(&path, first_grids(&text, times.len()).as_bytes()),
+        Err(_) => Ok(()),
+    }
+}
+
+const GRID_END: &str = "      </Grid>\n";
+const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
+
+/// The sidecar with only its first `count` grids.
+fn first_grids(text: &str, count: usize) -> String {
+    let end = text.match_indices(GRID_END).nth(count - 1).map_or(0, |(at, _)| at + GRID_END.len());
+    format!("{}{TAIL}", &text[..end])
+}
+
+/// XDMF over the same datasets.
+///
+/// # Errors
+/// [`Error::File`] when it cannot be written.
+pub(super) fn write_xdmf(folder: &Path, times: &[f64], total: u64) -> Result<()> {
+    let mut text = String::from(
+        "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n    \
+         <Grid Name=\"particles\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+    );
+    for (number, &time) in times.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write_grid(&mut text, &particle_file(number), time, total);
+    }
+    text.push_str(TAIL);
+    write_atomically(&folder.join("particles.xmf"), text.as_bytes())
+}
+
+fn write_grid(text: &mut String, file: &str, time: f64, total: u64) -> std::fmt::Result {
+    writeln!(text, "      <Grid Name=\"{file}\" GridType=\"Uniform\">")?;
+    writeln!(text, "        <Time Value=\"{time:?}\"/>")?;
+    writeln!(
+        text,
+        "        <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{total}\" NodesPerElement=\"1\"/>"
+    )?;
+    let item = |number: &str, columns: u64, path: &str| {
+        let dimensions = if columns == 1 { total.to_string() } else { format!("{total} {columns}") };
+        let precision = if number == "UInt" { 4 } else { 8 };
+        format!(
+            "<DataItem Dimensions=\"{dimensions}\" NumberType=\"{number}\" Precision=\"{precision}\" \
+             Format=\"HDF\">{file}:/VTKHDF/{path}</DataItem>"
+        )
+    };
+    writeln!(text, "        <Geometry GeometryType=\"XYZ\">{}</Geometry>", item("Float", 3, "Points"))?;
+    for (name, kind, number, columns) in [
+        ("id", "Scalar", "UInt", 1),
+        ("species", "Scalar", "UInt", 1),
+        ("radius", "Scalar", "Float", 1),
+        ("orientation", "Matrix", "Float", 4),
+        ("velocity", "Vector", "Float", 3),
+        ("angular_velocity", "Vector", "Float", 3),
+        ("stress_trace", "Scalar", "Float", 1),
+        ("coordination", "Scalar", "UInt", 1),
+    ] {
+        let item = item(number, columns, &format!("PointData/{name}"));
+        writeln!(
+            text,
+            "        <Attribute Name=\"{name}\" AttributeType=\"{kind}\" Center=\"Node\">{item}</Attribute>"
+        )?;
+    }
+    text.push_str(GRID_END);
+    Ok(())
+}

@@ -1,0 +1,185 @@
+//! Snapshots: one VTKHDF file per time, written by all ranks together, with a time index that grows
+//! beside them. Particles in id order, contacts in key order. Knows nothing of how often they come.
+
+mod blocks;
+mod index;
+mod vtkhdf;
+
+use super::files::{create_folder, io_error};
+use crate::error::Result;
+use crate::exchange::{Communicator, agree};
+use crate::force::law::Column;
+use crate::state::ContactKey;
+use bytemuck::{Pod, Zeroable};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What a snapshot shows of a particle.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SnapshotParticle {
+    /// Global id.
+    pub id: u32,
+    /// Species.
+    pub species: u32,
+    /// Position, wrapped into the cell \[m\].
+    pub position: [f64; 3],
+    /// Radius \[m\].
+    pub radius: f64,
+    /// Orientation, unit quaternion (w, x, y, z).
+    pub orientation: [f64; 4],
+    /// Velocity at the full step \[m/s\].
+    pub velocity: [f64; 3],
+    /// Angular velocity at the full step \[rad/s\].
+    pub angular_velocity: [f64; 3],
+    /// Trace of the particle's stress, compression positive \[Pa\].
+    pub stress_trace: f64,
+    /// Number of contacts.
+    pub coordination: u32,
+    /// Keeps the layout free of hidden padding; zero.
+    pub reserved: u32,
+}
+
+/// What a snapshot shows of a contact.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SnapshotContact {
+    /// Identity.
+    pub key: ContactKey,
+    /// Position of the particle of low id \[m\].
+    pub start: [f64; 3],
+    /// Branch vector from the low to the high id's centre \[m\].
+    pub branch: [f64; 3],
+    /// Force on the particle of low id \[N\].
+    pub force: [f64; 3],
+    /// Normal force, compression positive \[N\].
+    pub normal_force: f64,
+    /// Overlap \[m\].
+    pub overlap: f64,
+}
+
+/// The contacts of one rank, each counted by the owner of its low id.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SnapshotContacts {
+    /// The contacts, in any order.
+    pub contacts: Vec<SnapshotContact>,
+    /// Memory columns per contact.
+    pub width: usize,
+    /// Row-major memory, `contacts.len() × width`.
+    pub memory: Vec<f64>,
+    /// Names and units of the memory columns of each pair of materials.
+    pub columns: Vec<Vec<Column>>,
+}
+
+/// The moment that a snapshot shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// Steps done.
+    pub step: u64,
+    /// Time \[s\].
+    pub time: f64,
+    /// Cell sides \[m\].
+    pub sides: [f64; 3],
+}
+
+/// The snapshots of a run: `snapshots/` in its directory.
+#[derive(Debug)]
+pub struct SnapshotSeries {
+    comm: Communicator,
+    folder: PathBuf,
+    times: Vec<f64>,
+}
+
+impl SnapshotSeries {
+    /// A new series; the folder is made with the first snapshot and older snapshots are removed.
+    /// Collective.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::File`] on every rank when old files cannot be removed.
+    pub fn create(comm: &Communicator, directory: &Path) -> Result<Self> {
+        Self::resume(comm, directory, 0)
+    }
+
+    /// Go on after the first `count` snapshots of a run (restart), removing later ones. Collective.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::File`] on every rank when the index holds fewer or files cannot be removed.
+    pub fn resume(comm: &Communicator, directory: &Path, count: u64) -> Result<Self> {
+        let folder = directory.join("snapshots");
+        let kept = if comm.rank() == 0 { keep_first(&folder, count) } else { Ok(Vec::new()) };
+        let times = agree(comm, kept)?;
+        Ok(Self { comm: comm.clone(), folder, times: share(comm, &times) })
+    }
+
+    /// Number of snapshots written.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.times.len() as u64
+    }
+
+    /// Write the next snapshot. Collective; every rank passes its owned particles (of `total` over all
+    /// ranks) and, if contacts are wanted, those whose low id it owns, in any order.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::File`] on every rank when the disk has no room or cannot be written; no
+    /// partial file remains under a final name.
+    pub fn write(
+        &mut self,
+        moment: &Moment,
+        total: u64,
+        particles: Vec<SnapshotParticle>,
+        contacts: Option<SnapshotContacts>,
+    ) -> Result<PathBuf> {
+        let number = self.times.len();
+        let (first, particles) = blocks::particles_by_id(&self.comm, total, particles);
+        let path = self.folder.join(index::particle_file(number));
+        vtkhdf::write_particles(&self.comm, &path, moment, total, first, &particles)?;
+        if let Some(contacts) = contacts {
+            let contacts = blocks::contacts_by_key(&self.comm, total, contacts);
+            vtkhdf::write_contacts(&self.comm, &self.folder.join(index::contact_file(number)), moment, &contacts)?;
+        }
+        self.times.push(moment.time);
+        let indexed = if self.comm.rank() == 0 { self.write_index(total) } else { Ok(()) };
+        agree(&self.comm, indexed)?;
+        Ok(path)
+    }
+
+    fn write_index(&self, total: u64) -> Result<()> {
+        index::write_series(&self.folder, "particles", &self.times, index::particle_file)?;
+        if self.folder.join(index::contact_file(self.times.len() - 1)).exists() {
+            index::write_series(&self.folder, "contacts", &self.times, index::contact_file)?;
+        }
+        index::write_xdmf(&self.folder, &self.times, total)
+    }
+}
+
+/// Remove all snapshots but the first `count` and return the times of those. Rank 0.
+fn keep_first(folder: &Path, count: u64) -> Result<Vec<f64>> {
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    if !folder.exists() && count == 0 {
+        return Ok(Vec::new());
+    }
+    create_folder(folder)?;
+    let times = index::read_times(folder, count)?;
+    let entries = fs::read_dir(folder).map_err(|error| io_error(folder, "read the folder", &error))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let later = name.to_str().and_then(index::number_of).is_some_and(|number| number >= count);
+        if later {
+            fs::remove_file(entry.path())
+                .map_err(|error| io_error(&entry.path(), "delete the old snapshot", &error))?;
+        }
+    }
+    index::keep_first(folder, &times)?;
+    Ok(times)
+}
+
+/// The times that rank 0 knows, on all ranks.
+fn share(comm: &Communicator, times: &[f64]) -> Vec<f64> {
+    let mut bytes = bytemuck::cast_slice::<f64, u8>(times).to_vec();
+    comm.broadcast(0, &mut bytes);
+    bytemuck::pod_collect_to_vec(&bytes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! Particles from a CSV or HDF5 file: a table with units in its column names. Checks every value and
+//! reports what is wrong with its place in the file.
+
+mod columns;
+mod csv;
+mod hdf5;
+
+use super::grid::Cell;
+use super::rcp::wrap;
+use crate::error::{Error, Result};
+use columns::{Columns, Quantity};
+use std::path::Path;
+
+/// One particle as the file gives it, SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Index into the names of species.
+    pub species: u32,
+    /// Centre, wrapped into the cell \[m\].
+    pub position: [f64; 3],
+    /// Radius \[m\].
+    pub radius: f64,
+    /// Velocity \[m/s\], if the file has it.
+    pub velocity: Option<[f64; 3]>,
+    /// Spin \[rad/s\], if the file has it.
+    pub spin: Option<[f64; 3]>,
+}
+
+/// What both formats come down to: columns of equal length, and where each row stands.
+#[derive(Debug)]
+struct Table {
+    columns: Columns,
+    species: Vec<String>,
+    /// One list per entry of `columns.numbers`, in the file's units.
+    numbers: Vec<Vec<f64>>,
+    /// Words for the place of each row: `line 7`, `row 6`.
+    place: Vec<String>,
+}
+
+/// So many problems are listed; the rest is counted.
+const MAX_PROBLEMS: usize = 10;
+
+/// Read particles; ids follow the order of the rows.
+///
+/// Columns (CSV, one header line) or datasets in the root group (HDF5, by the extension `.h5` or
+/// `.hdf5`): `species` (a name), `x_m`, `y_m`, `z_m`, `radius_m`, and, each as a complete triple or
+/// not at all, `vx_m_per_s` … and `wx_rad_per_s` …. Lengths also with the unit `mm`, `um` or `nm`,
+/// velocities with `mm_per_s`, `um_per_s` or `nm_per_s`. Lines that begin with `#` are comments.
+/// Positions beyond a periodic face are wrapped.
+///
+/// # Errors
+/// [`Error::File`] with line, column, value and remedy of every problem (the first ten).
+pub fn read(path: &Path, species: &[&str], cell: &Cell) -> Result<Vec<Row>> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_lowercase();
+    let table = match extension.as_str() {
+        "h5" | "hdf5" => hdf5::read(path),
+        "csv" => csv::read(path),
+        _ => Err("particles are read from .csv, .h5 and .hdf5 files; rename or convert the file".into()),
+    };
+    table
+        .and_then(|table| rows(&table, species, cell))
+        .map_err(|message| Error::File { path: path.to_owned(), message })
+}
+
+fn rows(table: &Table, species: &[&str], cell: &Cell) -> std::result::Result<Vec<Row>, String> {
+    let mut problems = Problems::default();
+    let rows = (0..table.species.len()).filter_map(|row| table.row(row, species, cell, &mut problems)).collect();
+    problems.into_result(rows)
+}
+
+impl Table {
+    /// One checked particle; `None`, with the reasons in `problems`, if it cannot be used.
+    fn row(&self, row: usize, species: &[&str], cell: &Cell, problems: &mut Problems) -> Option<Row> {
+        let before = problems.count;
+        let name = self.species[row].as_str();
+        let species_index = species.iter().position(|known| *known == name);
+        if species_index.is_none() {
+            problems.add(format!(
+                "{}, column species: unknown species \"{name}\"; known: {}",
+                self.place[row],
+                species.join(", ")
+            ));
+        }
+        let mut number = |quantity: Quantity, axis: usize| -> Option<f64> {
+            let column = self.columns.index(quantity, axis)?;
+            let value = self.numbers[column][row];
+            if let Some(reason) = refuse(quantity, value, self.columns.numbers[column].to_si(value), axis, cell) {
+                let name = &self.columns.numbers[column].name;
+                problems.add(format!("{}, column {name}: {value} {reason}", self.place[row]));
+            }
+            Some(self.columns.numbers[column].to_si(value))
+        };
+        let mut triple = |quantity| Some([number(quantity, 0)?, number(quantity, 1)?, number(quantity, 2)?]);
+        let position = triple(Quantity::Position)?;
+        let (velocity, spin) = (triple(Quantity::Velocity), triple(Quantity::Spin));
+        let radius = number(Quantity::Radius, 0)?;
+        if problems.count > before {
+            return None;
+        }
+        let position = [0, 1, 2].map(|k| if cell.periodic[k] { wrap(position[k], cell.sides[k]) } else { position[k] });
+        Some(Row { species: species_index? as u32, position, radius, velocity, spin })
+    }
+}
+
+/// Why a number cannot be used, with the remedy.
+fn refuse(quantity: Quantity, value: f64, si: f64, axis: usize, cell: &Cell) -> Option<String> {
+    if !value.is_finite() {
+        return Some("is not a finite number; correct it or remove the particle".into());
+    }
+    if quantity == Quantity::Radius && si <= 0.0 {
+        return Some("is not a radius; it must be greater than 0".into());
+    }
+    if quantity == Quantity::Position && !cell.periodic[axis] && !(0.0..=cell.sides[axis]).contains(&si) {
+        return Some(format!(
+            "lies outside the walls of the cell, which reaches from 0 to {:e} m; move the particle or enlarge the cell",
+            cell.sides[axis]
+        ));
+    }
+    None
+}
+
+/// Collects what is wrong, so that all of it is told at once.
+#[derive(Debug, Default)]
+struct Problems {
+    count: usize,
+    texts: Vec<String>,
+}
+
+impl Problems {
+    fn add(&mut self, text: String) {
+        self.count += 1;
+        if self.texts.len() < MAX_PROBLEMS {
+            self.texts.push(text);
+        }
+    }
+
+    fn into_result<T>(self, value: T) -> std::result::Result<T, String> {
+        let hidden = self.count - self.texts.len();
+        match (self.count, hidden) {
+            (0, _) => Ok(value),
+            (_, 0) => Err(self.texts.join("\n")),
+            _ => Err(format!("{}\nand {hidden} more", self.texts.join("\n"))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,137 @@
+//! The check that every packing passes before it is used: nothing overlaps more than allowed.
+
+use super::grid::{Ball, Cell, Grid};
+use crate::error::{Error, Result};
+
+/// A pair of particles (or a particle and a wall) and how far they overlap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Worst {
+    ids: [usize; 2],
+    /// Overlap over the smaller radius.
+    fraction: f64,
+}
+
+/// Refuse balls (index = id) of which a pair, images of one particle included, overlaps by more than
+/// `max_fraction` of the smaller radius, or of which one reaches that far through a wall.
+///
+/// Cost is linear in the number of balls.
+///
+/// # Errors
+/// [`Error::Packing`] naming the worst pair, its overlap and what to do.
+pub fn check_overlaps(balls: &[Ball], cell: &Cell, max_fraction: f64) -> Result<()> {
+    check_against_faces(balls, cell, max_fraction)?;
+    let grid = Grid::new(*cell, balls, 1.0);
+    let mut worst = Worst { ids: [0, 0], fraction: max_fraction };
+    for (index, ball) in balls.iter().enumerate() {
+        grid.visit_near(index, ball, 1.0, true, |other, image| {
+            if other == index {
+                return;
+            }
+            let partner = &balls[other];
+            let d = image.separation(ball, partner);
+            let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            let fraction = (ball.radius + partner.radius - distance) / ball.radius.min(partner.radius);
+            let ids = [index.min(other), index.max(other)];
+            if fraction > worst.fraction || (fraction == worst.fraction && fraction > max_fraction && ids < worst.ids) {
+                worst = Worst { ids, fraction };
+            }
+        });
+    }
+    if worst.fraction > max_fraction {
+        let [low, high] = worst.ids;
+        return Err(Error::Packing(format!(
+            "particles {low} and {high} overlap by {:.4e} m, {:.4} of the smaller radius, where {max_fraction} is \
+             allowed; correct their positions or radii, enlarge the cell, or raise the allowed overlap fraction",
+            worst.fraction * balls[low].radius.min(balls[high].radius),
+            worst.fraction
+        )));
+    }
+    Ok(())
+}
+
+/// Own images across the periodic faces, and walls. It comes first: thereafter the cell is known to be
+/// wide enough for a search of few images.
+fn check_against_faces(balls: &[Ball], cell: &Cell, max_fraction: f64) -> Result<()> {
+    for (id, ball) in balls.iter().enumerate() {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let (side, position) = (cell.sides[axis], ball.position[axis]);
+            let (overlap, what) = if cell.periodic[axis] {
+                (2.0 * ball.radius - side, "its own periodic image")
+            } else {
+                (ball.radius - position.min(side - position), "a wall")
+            };
+            // Beyond two radii there is no telling how many images touch: no such cell makes sense.
+            if overlap > max_fraction.min(1.0) * ball.radius {
+                return Err(Error::Packing(format!(
+                    "particle {id} (radius {:.4e} m, {name} = {position:.4e} m) overlaps {what} by {overlap:.4e} m, \
+                     {:.4} of its radius, where {max_fraction} is allowed; enlarge the cell (side {side:.4e} m), move \
+                     the particle, or make it smaller",
+                    ball.radius,
+                    overlap / ball.radius
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn balls(list: &[([f64; 3], f64)]) -> Vec<Ball> {
+        list.iter().map(|(position, radius)| Ball { position: *position, radius: *radius }).collect()
+    }
+
+    fn cube(side: f64) -> Cell {
+        Cell { sides: [side; 3], periodic: [true; 3] }
+    }
+
+    #[test]
+    fn the_worst_pair_is_named_with_its_overlap() {
+        let list = balls(&[([1.0; 3], 0.5), ([1.0, 1.0, 1.8], 0.5), ([5.0; 3], 1.0), ([5.0, 5.0, 6.0], 0.5)]);
+        let message = check_overlaps(&list, &cube(10.0), 0.1).unwrap_err().to_string();
+        assert!(message.contains("particles 2 and 3") && message.contains("1.0000 of the smaller"), "{message}");
+        assert!(check_overlaps(&list, &cube(10.0), 1.01).is_ok());
+    }
+
+    #[test]
+    fn overlaps_across_periodic_faces_are_found_and_across_walls_are_not() {
+        let list = balls(&[([0.5, 5.0, 5.0], 0.5), ([9.8, 5.0, 5.0], 0.5)]);
+        assert!(check_overlaps(&list, &cube(10.0), 0.1).unwrap_err().to_string().contains("particles 0 and 1"));
+        let walled = Cell { periodic: [false, true, true], ..cube(10.0) };
+        let message = check_overlaps(&list, &walled, 0.1).unwrap_err().to_string();
+        assert!(message.contains("particle 1") && message.contains("wall"), "{message}");
+    }
+
+    #[test]
+    fn own_images_count_as_partners() {
+        let message = check_overlaps(&balls(&[([0.1; 3], 0.6)]), &cube(1.0), 0.1).unwrap_err().to_string();
+        assert!(message.contains("own periodic image"), "{message}");
+    }
+
+    #[test]
+    fn two_spheres_that_touch_across_all_faces_pass() {
+        let cell = Cell { sides: [1.0, 1.0, 2.0], periodic: [true; 3] };
+        let list = balls(&[([0.5, 0.5, 0.5], 0.5), ([0.5, 0.5, 1.5], 0.5)]);
+        assert!(check_overlaps(&list, &cell, 0.0).is_ok());
+    }
+
+    #[test]
+    fn agrees_with_brute_force_on_random_points() {
+        use super::super::random::{Draws, Purpose};
+        use super::super::test_input::smallest_relative_distance;
+        for count in [2, 5, 60] {
+            let list: Vec<Ball> = (0..count)
+                .map(|id| {
+                    let mut draws = Draws::new(count, Purpose::Position, id);
+                    Ball { position: [0; 3].map(|_| 2.0 * draws.uniform()), radius: 0.01 + 0.2 * draws.uniform() }
+                })
+                .collect();
+            let positions: Vec<_> = list.iter().map(|ball| ball.position).collect();
+            let radii: Vec<_> = list.iter().map(|ball| ball.radius).collect();
+            let free = smallest_relative_distance(&positions, &radii, &cube(2.0)) >= 1.0;
+            assert_eq!(check_overlaps(&list, &cube(2.0), 0.0).is_ok(), free);
+        }
+    }
+}

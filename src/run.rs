@@ -1,0 +1,220 @@
+//! A run from input to final digest: outer loop over steps, what is written when, signals, restart.
+
+mod output;
+mod signals;
+
+use crate::config::{Config, Interval};
+use crate::error::Result;
+use crate::exchange::{Communicator, agree};
+use crate::force::observe::Wanted;
+use crate::output::checkpoint;
+use crate::output::digest;
+use crate::setup::{self, Initial};
+use crate::simulation::{Requests, Simulation, Stage};
+use crate::state::GlobalState;
+use output::RunOutput;
+use signals::Signals;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How a run is started beside its input.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Checkpoint file or run directory to go on from.
+    pub restart: Option<PathBuf>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All stages are done.
+    Finished,
+    /// SIGUSR1: a checkpoint is written, queue the run again.
+    Requeue,
+    /// SIGINT or SIGTERM (the number): a checkpoint is written.
+    Stopped(i32),
+}
+
+/// Run a configuration on the ranks of `comm`; ranks that the grid has no use for stay idle.
+///
+/// # Errors
+/// Whatever went wrong, the same error on every rank that computes.
+pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> Result<Outcome> {
+    let threads = set_up_threads(comm, config);
+    let initial = match &options.restart {
+        Some(path) => from_checkpoint(comm, config, path)?,
+        None => setup::from_packing(comm, config)?,
+    };
+    let decomposition = agree(comm, setup::decomposition(comm, config, &initial.global))?;
+    let ranks = decomposition.ranks();
+    if ranks < comm.size() && comm.rank() == 0 {
+        eprintln!(
+            "dem-mpi: {} particles on {ranks} of {} ranks (grid {:?}), the others stay idle; set parallel.grid or \
+             parallel.min_particles_per_rank to use more",
+            initial.global.particles,
+            comm.size(),
+            decomposition.grid
+        );
+    }
+    // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
+    let initial = setup::onto_first(comm, ranks, initial)?;
+    let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
+    let restarted = options.restart.is_some();
+    agree(&active, prepare_directory(&active, config, restarted, &initial.global))?;
+    let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
+    Run::new(simulation, Arc::clone(config))?.to_the_end()
+}
+
+/// Threads of this rank: as given, else the cores that this rank may use. Enters rayon's pool from the
+/// main thread, so that handing it work costs little.
+pub fn set_up_threads(comm: &Communicator, config: &Config) -> usize {
+    let threads = config.parallel.threads.unwrap_or_else(|| automatic_threads(comm.size()));
+    // A second call in one process (tests, verify) keeps the first pool.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread().build_global();
+    rayon::current_num_threads()
+}
+
+fn automatic_threads(ranks: usize) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let local = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"]
+        .iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok())
+        .unwrap_or(ranks);
+    (cores / local.max(1)).max(1)
+}
+
+fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<Initial> {
+    let found = if comm.rank() == 0 { checkpoint_file(path).map(Some) } else { Ok(None) };
+    let mut bytes = agree(comm, found)?.map(|file| file.into_os_string().into_encoded_bytes()).unwrap_or_default();
+    comm.broadcast(0, &mut bytes);
+    let file = PathBuf::from(String::from_utf8_lossy(&bytes).into_owned());
+    let read = checkpoint::read(comm, &file)?;
+    if comm.rank() == 0 {
+        eprintln!("dem-mpi: restart from {} (step {}, time {:.6e} s)", file.display(), read.global.step, read.global.time);
+    }
+    agree(comm, setup::from_checkpoint(config, read))
+}
+
+fn checkpoint_file(path: &Path) -> Result<PathBuf> {
+    if path.is_dir() {
+        let latest = checkpoint::latest(path)?;
+        for warning in &latest.warnings {
+            eprintln!("dem-mpi: warning: {warning}");
+        }
+        Ok(latest.path)
+    } else {
+        Ok(path.to_path_buf())
+    }
+}
+
+/// Rank 0: the run directory with the resolved input; on restart tables and snapshots cut to the
+/// checkpoint, so that the directory equals that of an uninterrupted run.
+fn prepare_directory(comm: &Communicator, config: &Config, restarted: bool, global: &GlobalState) -> Result<()> {
+    if comm.rank() != 0 {
+        return Ok(());
+    }
+    output::prepare_directory(config, restarted, global)
+}
+
+/// A run in progress on one rank.
+struct Run {
+    simulation: Simulation,
+    config: Arc<Config>,
+    output: RunOutput,
+    signals: Signals,
+    started: Instant,
+    first_step: u64,
+    last_checkpoint: Instant,
+}
+
+impl Run {
+    fn new(simulation: Simulation, config: Arc<Config>) -> Result<Self> {
+        let output = RunOutput::new(&simulation, &config)?;
+        let signals = agree(simulation.comm(), Signals::listen())?;
+        let first_step = simulation.global().step;
+        Ok(Self { simulation, config, output, signals, started: Instant::now(), first_step, last_checkpoint: Instant::now() })
+    }
+
+    fn to_the_end(mut self) -> Result<Outcome> {
+        while !self.simulation.settle_stage() {
+            let wanted = self.wanted();
+            let requests = self.requests();
+            let Self { simulation, output, .. } = &mut self;
+            let agreed = simulation.step(wanted, requests, |simulation, report| output.write(simulation, report, wanted))?;
+            let step = self.simulation.global().step;
+            let every = self.config.output.checkpoint_steps;
+            if agreed.stop != 0.0 {
+                return self.stop(agreed.stop as i32);
+            }
+            if agreed.checkpoint != 0.0 || (every != 0 && step.is_multiple_of(every)) {
+                self.checkpoint()?;
+            }
+            self.output.progress(&mut self.simulation);
+        }
+        self.finish()
+    }
+
+    /// What is due at the present state. Counting what is written keeps this the same after a restart.
+    fn wanted(&self) -> Wanted {
+        let global = self.simulation.global();
+        let history = is_due(self.config.output.history, global, global.history_rows);
+        let snapshot = self.config.output.snapshots.is_some_and(|every| is_due(every, global, global.snapshots));
+        Wanted { sums: history, samples: snapshot, ledger: false }
+    }
+
+    fn requests(&self) -> Requests {
+        let wall = self.config.output.checkpoint_wall_time;
+        let due = self.simulation.comm().rank() == 0
+            && wall.is_some_and(|seconds| self.last_checkpoint.elapsed().as_secs_f64() >= seconds);
+        Requests { stop: f64::from(self.signals.pending()), checkpoint: f64::from(u8::from(due)) }
+    }
+
+    fn checkpoint(&mut self) -> Result<PathBuf> {
+        self.simulation.timers_mut().start(Stage::Output);
+        let (particles, memory) = self.simulation.export()?;
+        let columns = self.simulation.model().columns();
+        let written = checkpoint::write(
+            self.simulation.comm(),
+            &self.config.output.directory,
+            &self.config.resolved,
+            &columns,
+            self.simulation.global(),
+            particles,
+            memory,
+            self.config.output.checkpoints_kept,
+        );
+        self.simulation.timers_mut().stop();
+        self.last_checkpoint = Instant::now();
+        written
+    }
+
+    fn stop(mut self, signal: i32) -> Result<Outcome> {
+        let path = self.checkpoint()?;
+        let requeue = signal == signals::USR1;
+        self.output.stopped(&self.simulation, &path, requeue)?;
+        Ok(if requeue { Outcome::Requeue } else { Outcome::Stopped(signal) })
+    }
+
+    /// Final checkpoint, then the last row and snapshot, digest and table.
+    fn finish(mut self) -> Result<Outcome> {
+        self.checkpoint()?;
+        let (particles, memory) = self.simulation.export()?;
+        let digest = digest::digest(self.simulation.comm(), self.simulation.global(), &particles, &memory);
+        let wanted = Wanted { sums: true, samples: self.config.output.snapshots.is_some(), ledger: false };
+        let report = self.simulation.observe(wanted)?;
+        self.output.write(&mut self.simulation, &report, wanted)?;
+        let steps = self.simulation.global().step - self.first_step;
+        self.output.finish(&self.simulation, &digest, self.started.elapsed(), steps)?;
+        Ok(Outcome::Finished)
+    }
+}
+
+/// Row number `written` is due at `written` intervals.
+fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
+    match every {
+        Interval::Steps(steps) => global.step >= written * steps,
+        // A hair early, so that rounding of the time does not cost a step.
+        Interval::Time(time) => global.time >= written as f64 * time * (1.0 - 1e-9),
+    }
+}

@@ -1,0 +1,278 @@
+//! From the checked input to a simulation ready to step: model, decomposition, packing or checkpoint.
+
+use crate::config::{Boundary, Config, Motion, ParallelConfig, TimeStepConfig};
+use crate::contact::build::BuildContext;
+use crate::error::{Error, Result};
+use crate::exchange::{Communicator, Decomposition, ExactSum, agree, distribute, exact_sum};
+use crate::force::pass;
+use crate::integrate::time_step::TimeStepControl;
+use crate::load::LoadProgramme;
+use crate::output::checkpoint::Checkpoint;
+use crate::packing;
+use crate::simulation::{Model, Simulation};
+use crate::state::particles::{SpeciesConstants, sphere_mass};
+use crate::state::{ContactMemory, GlobalState, ParticleState};
+use std::sync::Arc;
+
+/// Particles spread over the ranks in any way, with what belongs to them.
+pub struct Initial {
+    /// Global state, the same on every rank.
+    pub global: GlobalState,
+    /// Particles that this rank holds for now.
+    pub particles: Vec<ParticleState>,
+    /// Contact memory that this rank holds for now.
+    pub memory: ContactMemory,
+}
+
+/// What all ranks must know of all particles.
+#[derive(Debug, Clone, Copy)]
+struct Extremes {
+    max_radius: f64,
+    min_mass: f64,
+    max_mass: f64,
+    max_spin: f64,
+    solid_volume: f64,
+}
+
+/// The packing as initial state, on rank 0; the others hold nothing yet.
+///
+/// # Errors
+/// The packing cannot be made; the same error on every rank.
+pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
+    let built = if comm.rank() == 0 { packing::build(config).map(Some) } else { Ok(None) };
+    let built = agree(comm, built)?;
+    let mut header = Vec::new();
+    let mut particles = Vec::new();
+    if let Some(packing) = built {
+        header.extend_from_slice(bytemuck::bytes_of(&packing.sides));
+        header.extend_from_slice(&(packing.particles.len() as u64).to_le_bytes());
+        particles = packing.particles;
+    }
+    comm.broadcast(0, &mut header);
+    let sides: [f64; 3] = bytemuck::pod_read_unaligned(&header[..24]);
+    let count: u64 = bytemuck::pod_read_unaligned(&header[24..32]);
+    let mut global = GlobalState {
+        step: 0,
+        time: 0.0,
+        time_step: 0.0,
+        previous_time_step: 0.0,
+        initial_sides: sides,
+        sides,
+        strain: [0.0; 3],
+        strain_rate: [0.0; 3],
+        stage: 0,
+        stage_start_time: 0.0,
+        stage_start_strain: [0.0; 3],
+        stage_start_step: 0,
+        stage_start_stress: [0.0; 3],
+        history_rows: 0,
+        snapshots: 0,
+        measured_stress: [0.0; 3],
+        particles: count,
+    };
+    programme(config).enter(&mut global);
+    Ok(Initial { global, particles, memory: ContactMemory::new(0) })
+}
+
+/// A checkpoint as initial state.
+///
+/// # Errors
+/// The checkpoint belongs to another input (number of species or contact-memory width differ).
+pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initial> {
+    let species = config.species.len() as u32;
+    if let Some(particle) = checkpoint.particles.iter().find(|p| p.species >= species) {
+        return Err(Error::Input(format!(
+            "the checkpoint does not fit this input: particle {} has species number {}, the input has {species} species; \
+             restart with the configuration of that run (config.resolved.toml beside the checkpoint)",
+            particle.id, particle.species
+        )));
+    }
+    Ok(Initial { global: checkpoint.global, particles: checkpoint.particles, memory: checkpoint.memory })
+}
+
+/// The grid of ranks for a number of particles, and the ranks that it uses.
+///
+/// # Errors
+/// An explicit grid that cannot work.
+pub fn decomposition(comm: &Communicator, config: &Config, global: &GlobalState) -> Result<Decomposition> {
+    let ParallelConfig { grid, min_particles_per_rank, .. } = config.parallel;
+    match grid {
+        Some(grid) => Decomposition::explicit(grid, comm.size()),
+        None => Ok(Decomposition::automatic(comm.size(), global.particles, min_particles_per_rank, global.sides)),
+    }
+}
+
+fn programme(config: &Config) -> LoadProgramme {
+    LoadProgramme { stages: config.stages.clone(), kinematics: config.kinematics }
+}
+
+/// The model: constants of species, passes, bounds, from the input and all particles.
+///
+/// # Errors
+/// The memory of a checkpoint does not fit the laws of this input; the cell is too small for the
+/// particles.
+pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Result<Model> {
+    let species: Vec<SpeciesConstants> = config
+        .species
+        .iter()
+        .map(|s| {
+            let material = &config.materials[s.material];
+            SpeciesConstants {
+                density: material.density * material.density_scaling,
+                driven: matches!(s.motion, Motion::Driven { .. }),
+            }
+        })
+        .collect();
+    let extremes = extremes(comm, &species, &initial.particles);
+    let passes: Vec<_> = config.pairs.iter().map(pass::build).collect();
+    let fraction = match config.time_step {
+        TimeStepConfig::Automatic { reference_overlap, .. } => reference_overlap,
+        TimeStepConfig::Fixed(_) => 1e-3,
+    };
+    let overlap = fraction * extremes.max_radius;
+    let stiffnesses = passes.iter().map(|pass| pass.reference_stiffness(overlap, 0.5 * extremes.max_radius));
+    let time_step = TimeStepControl {
+        config: config.time_step,
+        min_mass: extremes.min_mass,
+        max_mass: extremes.max_mass,
+        reference_overlap: overlap,
+        reference_stiffness: stiffnesses.fold(0.0, |m, k| if k > m { k } else { m }),
+    };
+    let walls = config.cell.boundary.map(|boundary| match boundary {
+        Boundary::Periodic => None,
+        Boundary::Walls { material } => Some(material),
+    });
+    let lists = BuildContext {
+        material: config.species.iter().map(|s| s.material).collect(),
+        materials: config.materials.len(),
+        columns: passes.iter().map(|pass| pass.columns().len()).collect(),
+        walls,
+        total: initial.global.particles as u32,
+        skin: 0.0,
+    };
+    let turns = passes.iter().any(|pass| pass.stride() > 4) || extremes.max_spin > 0.0;
+    let model = Model {
+        config: Arc::clone(config),
+        species,
+        passes,
+        programme: programme(config),
+        time_step,
+        lists,
+        max_radius: extremes.max_radius,
+        solid_volume: extremes.solid_volume,
+        rotation: turns,
+    };
+    agree(comm, check_fit(&model, initial))?;
+    Ok(model)
+}
+
+fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
+    let width = model.lists.memory_width();
+    if !initial.memory.keys.is_empty() && initial.memory.width != width {
+        return Err(Error::Input(format!(
+            "the checkpoint does not fit this input: it holds {} numbers per contact, the contact laws of the input need \
+             {width}; restart with the contact laws of that run",
+            initial.memory.width
+        )));
+    }
+    let reach = 2.0 * model.max_radius * (1.0 + model.config.parallel.skin);
+    for (axis, side) in initial.global.sides.iter().enumerate() {
+        // Contacts carry image shifts of at most three: one for the wrap and two for the reach.
+        if model.lists.walls[axis].is_none() && 2.0 * side <= reach {
+            return Err(Error::Packing(format!(
+                "cell side {} is {side:.4e} m, less than half of the largest diameter with its skin, {reach:.4e} m: no \
+                 periodic cell can be that thin; make the cell larger or use walls",
+                ["x", "y", "z"][axis]
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[ParticleState]) -> Extremes {
+    let mut low = [f64::INFINITY];
+    let mut high = [0.0_f64; 3];
+    let mut volume = [ExactSum::new()];
+    let raise = |place: &mut f64, value: f64| {
+        if value > *place {
+            *place = value;
+        }
+    };
+    for particle in particles {
+        let constants = species[particle.species as usize];
+        let mass = sphere_mass(particle.radius, constants.density);
+        volume[0].add(sphere_mass(particle.radius, 1.0));
+        raise(&mut high[0], particle.radius);
+        for spin in particle.spin {
+            raise(&mut high[2], spin.abs());
+        }
+        if !constants.driven {
+            raise(&mut high[1], mass);
+            if mass < low[0] {
+                low[0] = mass;
+            }
+        }
+    }
+    comm.min_f64(&mut low);
+    comm.max_f64(&mut high);
+    exact_sum::reduce(comm, &mut volume);
+    Extremes {
+        max_radius: high[0],
+        min_mass: low[0],
+        max_mass: high[1],
+        max_spin: high[2],
+        solid_volume: volume[0].value(),
+    }
+}
+
+/// The simulation of this rank, its particles with their owners.
+///
+/// # Errors
+/// As [`model`] and [`Simulation::new`].
+pub fn simulation(
+    comm: Communicator,
+    config: &Arc<Config>,
+    decomposition: Decomposition,
+    mut initial: Initial,
+    threads: usize,
+) -> Result<Simulation> {
+    let mut model = model(&comm, config, &initial)?;
+    model.lists.skin = model.inner_skin();
+    if initial.memory.keys.is_empty() {
+        initial.memory = ContactMemory::new(model.lists.memory_width());
+    }
+    let (particles, memory) = distribute(
+        &comm,
+        &decomposition,
+        initial.particles,
+        initial.memory,
+        initial.global.sides,
+        initial.global.particles,
+    )?;
+    Simulation::new(comm, model, decomposition, initial.global, &particles, memory, threads)
+}
+
+/// Give what ranks beyond the first `ranks` hold to the ranks that compute.
+///
+/// # Errors
+/// The exchange failed.
+pub fn onto_first(comm: &Communicator, ranks: usize, initial: Initial) -> Result<Initial> {
+    if ranks == comm.size() {
+        return Ok(initial);
+    }
+    let mut sends = vec![Vec::new(); comm.size()];
+    let mut memory_sends = vec![Vec::new(); comm.size()];
+    let to = comm.rank() % ranks;
+    sends[to].extend_from_slice(bytemuck::cast_slice(&initial.particles));
+    memory_sends[to].extend_from_slice(bytemuck::cast_slice(&initial.memory.keys));
+    let mut value_sends = vec![Vec::new(); comm.size()];
+    value_sends[to].extend_from_slice(bytemuck::cast_slice(&initial.memory.values));
+    let joined = |sends: Vec<Vec<u8>>| comm.all_to_all(sends).concat();
+    let particles = bytemuck::pod_collect_to_vec(&joined(sends));
+    let memory = ContactMemory {
+        keys: bytemuck::pod_collect_to_vec(&joined(memory_sends)),
+        width: initial.memory.width,
+        values: bytemuck::pod_collect_to_vec(&joined(value_sends)),
+    };
+    Ok(Initial { global: initial.global, particles, memory })
+}

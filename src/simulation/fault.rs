@@ -1,0 +1,80 @@
+//! What went wrong on this rank, in words, and the post-mortem file with the particles concerned.
+
+use super::Simulation;
+use super::contacts::PassFault;
+use crate::error::{Error, Result};
+use crate::state::ParticleState;
+use serde_json::{Value, json};
+
+impl Simulation {
+    /// The error of a contact that overlaps too much or is not a number.
+    pub(super) fn describe_pass_fault(&self, fault: Option<PassFault>) -> Result<()> {
+        let Some(fault) = fault else { return Ok(()) };
+        let key = self.contacts.key(fault.section, fault.place, &self.particles, self.model.lists.total);
+        let section = &self.contacts.sections[fault.section];
+        let local = [section.first[fault.place], section.second[fault.place]];
+        let owned: Vec<usize> = local.iter().map(|i| *i as usize).filter(|i| *i < self.particles.owned).collect();
+        self.write_post_mortem(&owned);
+        Err(Error::Simulation {
+            step: self.global.step,
+            message: format!(
+                "rank {}: the contact of particles {} and {} overlaps by {:.4} of the smaller radius, more than \
+                 max_overlap_fraction = {}; use a smaller time step, a slower load or a looser packing (last states in \
+                 post_mortem)",
+                self.comm.rank(),
+                key.low,
+                key.high,
+                fault.overlap_ratio,
+                self.model.config.max_overlap_fraction
+            ),
+        })
+    }
+
+    /// The error of a particle that left through a wall or is not a number.
+    pub(super) fn describe_lost(&self, lost: Option<u32>) -> Result<()> {
+        let Some(index) = lost.map(|index| index as usize) else { return Ok(()) };
+        self.write_post_mortem(&[index]);
+        let state = self.particles.state(index);
+        Err(Error::Simulation {
+            step: self.global.step,
+            message: format!(
+                "rank {}: particle {} left the cell or is not a number: position {:?} m, velocity {:?} m/s, cell {:?} m; \
+                 use a smaller time step or a slower load (last states in post_mortem)",
+                self.comm.rank(),
+                state.id,
+                state.position,
+                state.velocity,
+                self.global.sides
+            ),
+        })
+    }
+
+    /// The particles concerned with their contacts, as JSON in the run directory. Failing to write it must
+    /// not hide the fault itself.
+    fn write_post_mortem(&self, particles: &[usize]) {
+        let rows: Vec<Value> = particles.iter().map(|index| self.particle_json(*index)).collect();
+        let text = json!({ "global": self.global, "particles": rows });
+        let name = format!("post_mortem-rank{}.json", self.comm.rank());
+        let path = self.model.config.output.directory.join(name);
+        if let Err(error) = std::fs::write(&path, format!("{text:#}\n")) {
+            eprintln!("dem-mpi: {}: cannot write the post-mortem file: {error}", path.display());
+        }
+    }
+
+    fn particle_json(&self, index: usize) -> Value {
+        let ParticleState { id, species, position, radius, velocity, acceleration, spin, .. } =
+            self.particles.state(index);
+        let contacts: Vec<Value> = self.contacts.ends_of(index).iter().map(|end| {
+            let (number, place) = self.contacts.locate(end.line());
+            let section = &self.contacts.sections[number];
+            let key = self.contacts.key(number, place, &self.particles, self.model.lists.total);
+            let mut memory = vec![0.0; section.columns];
+            section.read_memory(place, &mut memory);
+            let stride = self.lines.stride;
+            let line = &self.lines.values[end.line() * stride..(end.line() + 1) * stride];
+            json!({ "low": key.low, "high": key.high, "shift": &key.shift[..3], "memory": memory, "force_on_low_N": &line[..3] })
+        }).collect();
+        json!({ "id": id, "species": species, "position_m": position, "radius_m": radius, "velocity_m_per_s": velocity,
+            "acceleration_m_per_s2": acceleration, "spin_rad_per_s": spin, "contacts": contacts })
+    }
+}

@@ -1,0 +1,116 @@
+//! When the lists are stale, and how they are made anew. Two lists: the Verlet list with the whole
+//! skin, and inside it the contact list with a thin one.
+
+use super::{Model, Simulation, Stage};
+use crate::error::Result;
+use crate::exchange::{HaloPlan, MigrationSetting, migrate};
+use crate::neighbour::verlet::Region;
+use crate::state::ContactMemory;
+
+/// Skin of the contact list as a fraction of the largest diameter.
+const INNER_SKIN: f64 = 0.005;
+
+/// How much motion the lists still bear. Results never depend on it: it only has to be safe.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ListBudget {
+    /// Cell sides when the contact list was made \[m\].
+    pub reference_sides: [f64; 3],
+    /// Cell sides when the Verlet list was made \[m\].
+    verlet_sides: [f64; 3],
+    /// Sum over earlier contact lists of the largest displacement during each \[m\].
+    displaced: f64,
+}
+
+impl Model {
+    /// Skin of the contact list \[m\].
+    #[must_use]
+    pub fn inner_skin(&self) -> f64 {
+        let fraction = 0.25 * self.config.parallel.skin;
+        2.0 * self.max_radius * if INNER_SKIN < fraction { INNER_SKIN } else { fraction }
+    }
+
+    /// Skin of the Verlet list \[m\].
+    #[must_use]
+    pub fn outer_skin(&self) -> f64 {
+        2.0 * self.max_radius * self.config.parallel.skin
+    }
+}
+
+impl Simulation {
+    /// Make anew what the motion since the last time has made stale; `displacement` is the largest one
+    /// of all ranks, relative to the affine motion of the cell.
+    pub(super) fn refresh_lists(&mut self, displacement: f64) -> Result<()> {
+        let sides = self.global.sides;
+        let stretch = |from: [f64; 3]| {
+            let factors = [0, 1, 2].map(|k| sides[k] / from[k]);
+            let low = factors.iter().fold(f64::INFINITY, |m, f| if *f < m { *f } else { m });
+            let high = factors.iter().fold(1.0_f64, |m, f| if *f > m { *f } else { m });
+            (low, high)
+        };
+        let largest_sum = 2.0 * self.model.max_radius;
+        // A pair farther than sum + skin then is farther than sum now, if
+        // low·(sum + skin) − 2·displacement > sum, for any sum up to the largest. A small part of the skin
+        // is kept for rounding.
+        let room =
+            |low: f64, skin: f64| low * skin - (if low < 1.0 { 1.0 - low } else { 0.0 }) * largest_sum - 1e-6 * skin;
+        let (inner_low, inner_high) = stretch(self.budget.reference_sides);
+        let (outer_low, _) = stretch(self.budget.verlet_sides);
+        let displaced = self.budget.displaced * inner_high + displacement;
+        if 2.0 * displaced >= room(outer_low, self.model.outer_skin()) - self.model.inner_skin() {
+            self.timers.start(Stage::Neighbours);
+            self.update_ghosts();
+            let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
+            self.rebuild_all(memory)?;
+            self.timers.verlet_rebuilds += 1;
+            self.timers.stop();
+        } else if 2.0 * displacement >= room(inner_low, self.model.inner_skin()) {
+            self.timers.start(Stage::Neighbours);
+            self.update_ghosts();
+            let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
+            self.budget.displaced = displaced;
+            self.rebuild_contacts(&memory);
+            self.timers.contact_rebuilds += 1;
+            self.timers.stop();
+        }
+        Ok(())
+    }
+
+    /// Particles to their owners, ghosts, Verlet list, contact list. `memory` holds at least the contacts
+    /// of the particles that are here.
+    pub(super) fn rebuild_all(&mut self, mut memory: ContactMemory) -> Result<()> {
+        let sides = self.global.sides;
+        self.particles.drop_ghosts();
+        let setting = MigrationSetting {
+            species: &self.model.species,
+            time_step: self.global.previous_time_step,
+            sides,
+            total: self.global.particles,
+        };
+        migrate(&self.comm, &self.decomposition, &mut self.particles, &mut memory, &setting)?;
+        let (low, high) = self.decomposition.bounds(self.comm.rank());
+        let region = Region {
+            sides,
+            periodic: self.periodic(),
+            low: [0, 1, 2].map(|k| low[k] * sides[k]),
+            high: [0, 1, 2].map(|k| high[k] * sides[k]),
+            max_radius: self.model.max_radius,
+            skin: self.model.outer_skin(),
+        };
+        self.particles.reorder(&region.spatial_order(&self.particles));
+        let reach = region.max_radius + region.skin;
+        self.halo =
+            HaloPlan::build(&self.comm, &self.decomposition, &mut self.particles, sides, region.periodic, reach)?;
+        self.candidates = region.candidates(&self.particles);
+        self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0 };
+        self.rebuild_contacts(&memory);
+        Ok(())
+    }
+
+    fn rebuild_contacts(&mut self, memory: &ContactMemory) {
+        let sides = self.global.sides;
+        self.budget.reference_sides = sides;
+        self.model.lists.fill(&mut self.contacts, &self.particles, sides, &self.candidates, memory);
+        self.lines.fit(&self.contacts, self.model.config.output.energy_ledger);
+        self.reference.take(&self.particles);
+    }
+}

@@ -1,0 +1,178 @@
+//! Homogenisation: from the observation of one state to the numbers that the history shows.
+
+use super::{Simulation, Stage};
+use crate::error::Result;
+use crate::exchange::ExactSum;
+use crate::exchange::exact_sum;
+use crate::force::observe::{Observation, SUMS, Sample, Sum, Wanted};
+use crate::integrate::time_step::Measured;
+use crate::output::history::HistoryRow;
+use crate::state::LEDGER;
+
+/// Particles with fewer contacts than this carry no load in three dimensions (rattlers).
+const RATTLER_CONTACTS: u32 = 4;
+
+/// Places of the particle sums behind the contact sums.
+#[derive(Debug, Clone, Copy)]
+#[repr(usize)]
+enum ParticleSum {
+    Kinetic = SUMS,
+    KineticStress = SUMS + 1,
+    NetForce = SUMS + 4,
+    Rattlers = SUMS + 5,
+    RattlerContacts = SUMS + 6,
+    Free = SUMS + 7,
+    Ledger = SUMS + 8,
+}
+
+const ALL_SUMS: usize = SUMS + 8 + LEDGER.len();
+
+/// One observed state.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The row of the history table.
+    pub row: HistoryRow,
+    /// Touching contacts of this rank, if wanted.
+    pub samples: Vec<Sample>,
+    /// Normal force on each wall \[N\].
+    pub wall_force: [f64; 6],
+    /// For the time step.
+    pub measured: Measured,
+}
+
+impl Simulation {
+    /// Add the particles' part, reduce over ranks, and turn sums into stress, energies, fabric.
+    pub(super) fn reduce(&mut self, mut observation: Observation, wanted: Wanted) -> Report {
+        self.timers.start(Stage::Reduce);
+        observation.sums.resize(ALL_SUMS, ExactSum::new());
+        let max_speed = self.add_particle_sums(&mut observation, wanted);
+        exact_sum::reduce(&self.comm, &mut observation.sums);
+        let mut largest = [observation.max_stiffness, observation.max_overlap_ratio, max_speed];
+        self.comm.max_f64(&mut largest);
+        let values: Vec<f64> = observation.sums.iter().map(ExactSum::value).collect();
+        let volume = self.global.sides[0] * self.global.sides[1] * self.global.sides[2];
+        let six = |from: usize, divisor: f64| std::array::from_fn(|k| values[from + k] / divisor);
+        let stress: [f64; 6] = six(Sum::Virial as usize, volume);
+        self.max_stiffness = largest[0];
+        let contacts = values[Sum::Contacts as usize];
+        let wall_contacts = values[Sum::WallContacts as usize];
+        let particles = self.global.particles as f64;
+        let ends = 2.0 * contacts + wall_contacts;
+        let bearing = particles - values[ParticleSum::Rattlers as usize];
+        let free = values[ParticleSum::Free as usize];
+        let row = HistoryRow {
+            step: self.global.step,
+            time: self.global.time,
+            time_step: self.global.time_step,
+            strain: self.global.strain,
+            stress,
+            kinetic_stress: std::array::from_fn(|k| values[ParticleSum::KineticStress as usize + k] / volume),
+            solid_fraction: self.model.solid_volume / volume,
+            coordination: ends / particles,
+            coordination_without_rattlers: if bearing > 0.0 {
+                (ends - values[ParticleSum::RattlerContacts as usize]) / bearing
+            } else {
+                0.0
+            },
+            rattlers: values[ParticleSum::Rattlers as usize] as u64,
+            contacts: (contacts + wall_contacts) as u64,
+            kinetic: values[ParticleSum::Kinetic as usize],
+            elastic: values[Sum::Elastic as usize],
+            viscoelastic: values[Sum::Viscoelastic as usize],
+            ledger: std::array::from_fn(|k| values[ParticleSum::Ledger as usize + k]),
+            unbalanced_ratio: (values[ParticleSum::NetForce as usize] / free)
+                / (values[Sum::ForceMagnitude as usize] / (contacts + wall_contacts)),
+            max_overlap_ratio: largest[1],
+            fabric: six(Sum::Fabric as usize, contacts),
+        };
+        self.timers.stop();
+        Report {
+            row,
+            samples: observation.samples,
+            wall_force: std::array::from_fn(|k| values[Sum::WallForce as usize + k]),
+            measured: Measured { max_stiffness: largest[0], max_speed: largest[2] },
+        }
+    }
+
+    /// Sums over owned particles; returns the largest speed. Particle by particle quantities only, so
+    /// that no distribution over ranks shows.
+    fn add_particle_sums(&self, observation: &mut Observation, wanted: Wanted) -> f64 {
+        let sums = &mut observation.sums;
+        let mut max_speed = 0.0;
+        let gradient = self.peculiar_gradient();
+        for index in 0..self.particles.owned {
+            let record = &self.particles.record[index];
+            let dot = |a: [f64; 3]| a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
+            // Peculiar velocity: relative to the affine flow of the cell.
+            let velocity = [0, 1, 2].map(|k| record.velocity[k] - gradient[k] * record.position[k]);
+            let squared = dot(velocity);
+            if record.inverse_mass > 0.0 && squared > max_speed {
+                max_speed = squared;
+            }
+            if !wanted.sums {
+                continue;
+            }
+            let inertia = 0.4 * record.mass * (record.radius * record.radius);
+            sums[ParticleSum::Kinetic as usize].add(0.5 * (record.mass * squared + inertia * dot(record.spin)));
+            for k in 0..3 {
+                sums[ParticleSum::KineticStress as usize + k].add(record.mass * (velocity[k] * velocity[k]));
+            }
+            if record.inverse_mass > 0.0 {
+                sums[ParticleSum::Free as usize].add(1.0);
+                sums[ParticleSum::NetForce as usize].add(record.mass * dot(self.particles.acceleration[index]).sqrt());
+            }
+            let touching = self.touching(index);
+            if touching < RATTLER_CONTACTS {
+                sums[ParticleSum::Rattlers as usize].add(1.0);
+                sums[ParticleSum::RattlerContacts as usize].add(f64::from(touching));
+            }
+            for (k, value) in self.particles.ledger[index].iter().enumerate() {
+                sums[ParticleSum::Ledger as usize + k].add(*value);
+            }
+        }
+        max_speed.sqrt()
+    }
+
+    /// L̇/L where velocities are absolute (BC), zero where they are peculiar (BCT).
+    pub(super) fn peculiar_gradient(&self) -> [f64; 3] {
+        let motion = self.cell_motion();
+        // BC carries the cell's motion in the shift velocity: one image per side length.
+        let per_image = motion.wall_velocity;
+        [0, 1, 2].map(|k| per_image[k] / motion.sides[k])
+    }
+
+    /// Number of touching contacts of an owned particle, from the lines of the last pass.
+    pub(super) fn touching(&self, particle: usize) -> u32 {
+        let stride = self.lines.stride;
+        let ends = self.contacts.ends_of(particle).iter();
+        ends.filter(|end| self.lines.values[end.line() * stride + 3] > 0.0).count() as u32
+    }
+
+    /// Time step and servo from what was measured at a control step.
+    pub(super) fn control(&mut self, report: &Report) -> Result<()> {
+        self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        let interval = self.global.time_step * self.model.config.control_interval as f64;
+        let stiffness = if self.max_stiffness > self.model.time_step.reference_stiffness {
+            self.max_stiffness
+        } else {
+            self.model.time_step.reference_stiffness
+        };
+        if interval > 0.0 {
+            self.model.programme.control(&mut self.global, stiffness / self.model.max_radius, interval);
+        }
+        let (chosen, warning) = self.model.time_step.choose(report.measured, self.global.step)?;
+        let limit = crate::load::LoadProgramme::time_step_limit(&self.global);
+        self.global.time_step = if chosen < limit { chosen } else { limit };
+        if let Some(text) = warning.filter(|_| !self.warned_about_time_step) {
+            self.warned_about_time_step = true;
+            self.warnings.push(text);
+        }
+        if self.global.time_step.is_finite() {
+            return Ok(());
+        }
+        Err(crate::error::Error::Simulation {
+            step: self.global.step,
+            message: "no particle is free to move, so no automatic time step exists; set time_step.fixed".into(),
+        })
+    }
+}

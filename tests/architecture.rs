@@ -1,0 +1,287 @@
+//! What `ARCHITECTURE.md` promises, checked on the source text: imports run one way, MPI, unsafe code and
+//! the HDF5 C interface stay in their named places, files stay short, nothing is left half done.
+
+mod source;
+
+use source::{Source, Token, crate_paths, files_below, root, rust_files};
+use std::collections::BTreeSet;
+use std::fs;
+
+/// The modules in the order of the data's way through a run, each with what it may import. A name stands
+/// for a whole module and must be listed above; `module::part` opens one part of a module that comes later.
+const LAYERS: &[(&str, &[&str])] = &[
+    ("error", &[]),
+    ("units", &["error"]),
+    ("random", &["error"]),
+    ("exact_sum", &["error"]),
+    // The catalogue of laws says which sections of the input exist.
+    ("config", &["error", "units", "force::registry"]),
+    ("state", &["error", "config"]),
+    ("exchange", &["error", "config", "state", "exact_sum"]),
+    ("packing", &["error", "config", "state", "exchange", "random"]),
+    ("neighbour", &["error", "config", "state"]),
+    // The list that holds the memory of contacts, and the geometry of one touch in lanes.
+    ("contact", &["error", "config", "state", "neighbour", "force::lane", "force::law"]),
+    ("force", &["error", "config", "state", "contact"]),
+    ("gather", &["error", "config", "state", "contact", "force"]),
+    ("integrate", &["error", "config", "state", "random"]),
+    ("load", &["error", "config", "state"]),
+    ("homogenise", &["error", "config", "state", "exact_sum", "exchange", "contact", "force"]),
+    ("output", &["error", "config", "units", "state", "exchange", "force", "homogenise"]),
+    ("plot", &["error", "config", "output"]),
+    (
+        "setup",
+        &[
+            "error",
+            "config",
+            "state",
+            "random",
+            "exchange",
+            "packing",
+            "neighbour",
+            "contact",
+            "force",
+            "load",
+            "output",
+        ],
+    ),
+    (
+        "simulation",
+        &[
+            "error",
+            "config",
+            "state",
+            "exact_sum",
+            "exchange",
+            "neighbour",
+            "contact",
+            "force",
+            "gather",
+            "integrate",
+            "load",
+            "homogenise",
+            "output",
+            "plot",
+            "setup",
+        ],
+    ),
+    ("routine", &["error", "config", "state", "exchange", "load", "homogenise", "output", "setup", "simulation"]),
+    ("verify", &["*"]),
+    ("bench", &["*"]),
+    ("cli", &["*"]),
+];
+
+/// Files that may hold unsafe code, with the reason.
+const UNSAFE_FILES: &[(&str, &str)] = &[
+    ("src/exchange/mpi.rs", "MPI's own handles and byte buffers"),
+    ("src/output/hdf5_file.rs", "collective transfer through the HDF5 C interface; reserving disk space"),
+    ("src/force/simd.rs", "SIMD lanes"),
+    ("src/force/pass.rs", "each thread writes its own lines of one output array"),
+];
+
+/// The file that speaks to the HDF5 C interface.
+const HDF5_FILE: &str = "src/output/hdf5_file.rs";
+
+/// Longest file in lines.
+const MAX_LINES: usize = 500;
+
+fn report(problems: &[String]) {
+    assert!(problems.is_empty(), "\n{}\n", problems.join("\n"));
+}
+
+fn layer(name: &str) -> Option<usize> {
+    LAYERS.iter().position(|(module, _)| *module == name)
+}
+
+fn names_crate(tokens: &[Token<'_>], at: usize, name: &str) -> bool {
+    let root_of_path = at == 0 || tokens[at - 1].text != "::";
+    let is_path = tokens.get(at + 1).is_some_and(|t| t.text == "::");
+    let is_import = at > 0 && matches!(tokens[at - 1].text, "use" | "crate") && !is_path;
+    tokens[at].text == name && root_of_path && (is_path || is_import)
+}
+
+fn lines_naming(source: &Source, name: &str) -> Vec<usize> {
+    let tokens = source::tokens(&source.code);
+    (0..tokens.len()).filter(|&at| names_crate(&tokens, at, name)).map(|at| tokens[at].line).collect()
+}
+
+#[test]
+fn the_table_of_layers_runs_one_way() {
+    let mut problems = Vec::new();
+    for (index, (module, imports)) in LAYERS.iter().enumerate() {
+        for import in imports.iter().filter(|import| !import.contains("::") && **import != "*") {
+            if layer(import).is_none_or(|place| place >= index) {
+                problems.push(format!("LAYERS: {module} imports {import}, which is not listed above it"));
+            }
+        }
+    }
+    report(&problems);
+}
+
+#[test]
+fn imports_run_one_way() {
+    let mut problems = Vec::new();
+    for source in rust_files(&["src"]) {
+        let module = source.module();
+        let Some(own) = module.first().copied() else { continue };
+        let Some(index) = layer(own) else {
+            problems.push(format!("{}: module {own} is not in LAYERS (tests/architecture.rs): add it", source.path));
+            continue;
+        };
+        let allowed = LAYERS[index].1;
+        for (path, line) in crate_paths(&source.tokens(), &module) {
+            let first = path[0].as_str();
+            let second = path.get(1).map_or_else(String::new, |part| format!("{first}::{part}"));
+            let fits = |entry: &str| entry == first || entry == second || entry == "*";
+            if layer(first).is_some() && first != own && !allowed.iter().any(|entry| fits(entry)) {
+                problems.push(format!(
+                    "{}:{line}: {own} must not import {first} (allowed: {}); pass what it needs as data or move the code",
+                    source.path,
+                    allowed.join(", ")
+                ));
+            }
+        }
+    }
+    report(&problems);
+}
+
+#[test]
+fn mpi_is_named_in_one_file_of_exchange() {
+    let using: BTreeSet<String> = rust_files(&["src"])
+        .iter()
+        .filter(|source| !lines_naming(source, "mpi").is_empty() || !lines_naming(source, "mpi_sys").is_empty())
+        .map(|source| source.path.clone())
+        .collect();
+    let outside: Vec<&String> = using.iter().filter(|path| !path.starts_with("src/exchange/")).collect();
+    assert!(outside.is_empty(), "MPI is used outside src/exchange: {outside:?}; go through the communicator");
+    assert!(using.len() <= 1, "MPI is used in several files, one is allowed: {using:?}");
+}
+
+#[test]
+fn the_hdf5_c_interface_is_called_in_one_file() {
+    let mut problems = Vec::new();
+    for source in rust_files(&["src"]).iter().filter(|source| source.path != HDF5_FILE) {
+        for line in lines_naming(source, "hdf5_sys") {
+            problems.push(format!("{}:{line}: HDF5 C calls belong in {HDF5_FILE}", source.path));
+        }
+    }
+    report(&problems);
+}
+
+#[test]
+fn unsafe_code_stays_in_named_files_and_gives_its_reason() {
+    let mut problems = Vec::new();
+    for source in rust_files(&["src", "benches"]) {
+        let tokens = source::tokens(&source.code);
+        let places = tokens.iter().enumerate().filter(|(_, token)| token.text == "unsafe");
+        for (at, token) in places {
+            let place = format!("{}:{}", source.path, token.line);
+            if !UNSAFE_FILES.iter().any(|(path, _)| *path == source.path) {
+                problems.push(format!("{place}: unsafe code outside UNSAFE_FILES (tests/architecture.rs)"));
+            }
+            let claims = tokens.get(at + 1).is_some_and(|next| matches!(next.text, "{" | "impl"));
+            if claims && !has_safety_comment(&source, token.line) {
+                problems.push(format!("{place}: a `// SAFETY:` comment must stand right before this"));
+            }
+        }
+    }
+    report(&problems);
+}
+
+/// Looks upwards from the statement that holds `line` for a `// SAFETY:` comment.
+fn has_safety_comment(source: &Source, line: usize) -> bool {
+    let text: Vec<&str> = source.text.lines().collect();
+    let code: Vec<&str> = source.code.lines().collect();
+    if text[line - 1].contains("// SAFETY:") {
+        return true;
+    }
+    for above in (0..line - 1).rev() {
+        if text[above].trim_start().starts_with("// SAFETY:") {
+            return true;
+        }
+        let ends_statement = code[above].trim_end().ends_with([';', '{', '}', ',']);
+        if ends_statement || text[above].trim().is_empty() {
+            return false;
+        }
+    }
+    false
+}
+
+#[test]
+fn files_stay_short() {
+    let problems: Vec<String> = rust_files(&["src", "tests", "benches"])
+        .iter()
+        .map(|source| (source, source.text.lines().count()))
+        .filter(|(_, lines)| *lines > MAX_LINES)
+        .map(|(source, lines)| format!("{}: {lines} lines, at most {MAX_LINES}: split it", source.path))
+        .collect();
+    report(&problems);
+}
+
+#[test]
+fn nothing_is_left_half_done() {
+    let mut problems = Vec::new();
+    for source in rust_files(&["src", "tests", "benches"]) {
+        let tokens = source::tokens(&source.code);
+        for pair in tokens.windows(2) {
+            if pair[1].text == "!" && matches!(pair[0].text, "todo" | "unimplemented" | "dbg") {
+                problems.push(format!("{}:{}: {}! is left in the code", source.path, pair[0].line, pair[0].text));
+            }
+        }
+    }
+    report(&problems);
+}
+
+#[test]
+fn no_file_names_a_path_of_one_machine() {
+    let homes = ["root", "home", "work", "Users"].map(|folder| format!("/{folder}/"));
+    let folders = ["src", "tests", "benches", "configs", "jobscripts", "scripts", "docs", ".ci"];
+    let single = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "Makefile", "Cargo.toml"];
+    let below = folders.iter().flat_map(|folder| files_below(&root().join(folder)));
+    let mut problems = Vec::new();
+    for path in below.chain(single.iter().map(|name| root().join(name))) {
+        let Ok(text) = fs::read_to_string(&path) else { continue };
+        for (index, line) in text.lines().enumerate() {
+            for home in &homes {
+                let starts_path =
+                    |at: usize| !line[..at].ends_with(|c: char| c.is_alphanumeric() || "._-})/".contains(c));
+                if line.match_indices(home.as_str()).any(|(at, _)| starts_path(at)) {
+                    problems.push(format!("{}:{}: absolute path {home}…", path.display(), index + 1));
+                }
+            }
+        }
+    }
+    report(&problems);
+}
+
+mod of_the_checks_themselves {
+    use super::source::{blank_comments_and_literals, crate_paths, tokens};
+
+    fn paths(code: &str, module: &[&str]) -> Vec<String> {
+        crate_paths(&tokens(code), module).into_iter().map(|(path, _)| path.join("::")).collect()
+    }
+
+    #[test]
+    fn comments_and_literals_are_blanked() {
+        let code = blank_comments_and_literals(
+            "a /* unsafe /* nested */ */ b // unsafe\n\"unsafe \\\" \" r#\"un\"safe\"# '\"' 'x: &'a c '\\'' d \"é\" e",
+        );
+        let words: Vec<&str> = tokens(&code).iter().map(|token| token.text).collect();
+        assert_eq!(words, ["a", "b", "'", "x", ":", "&", "'", "a", "c", "d", "e"]);
+    }
+
+    #[test]
+    fn grouped_imports_are_expanded() {
+        assert_eq!(
+            paths("use crate::{state::{Cell, self}, force::lane::*}; fn f() { crate::error::new() }", &[]),
+            ["state::Cell", "state::self", "force::lane::*", "error::new"]
+        );
+    }
+
+    #[test]
+    fn super_is_resolved_to_the_root() {
+        assert_eq!(paths("use super::lane::Lane;", &["force", "hertz"]), ["force::lane::Lane"]);
+        assert_eq!(paths("use super::super::exchange::X;", &["force", "hertz"]), ["exchange::X"]);
+        assert_eq!(paths("pub(super) fn f() {} pub(crate) fn g() {}", &["force", "hertz"]), [""; 0]);
+    }
+}
