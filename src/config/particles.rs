@@ -187,7 +187,6 @@ fn share(
 }
 
 /// Whole numbers that sum to `total` and are as near as can be to its shares.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn largest_remainders(total: u64, fractions: &[f64]) -> Vec<u64> {
     let exact: Vec<f64> = fractions.iter().map(|fraction| fraction * total as f64).collect();
     let mut counts: Vec<u64> = exact.iter().map(|share| libm::floor(*share) as u64).collect();

@@ -86,7 +86,6 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         }
         return;
     }
-    #[allow(clippy::cast_precision_loss)]
     let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),

@@ -15,7 +15,6 @@ impl<'a> Section<'a> {
             panic!("`{name}` is described as {kind:?}, not as numbers")
         };
         let value = match &node.value {
-            #[allow(clippy::cast_precision_loss)]
             Value::Integer(v) => *v as f64,
             Value::Float(v) => *v,
             Value::Text(text) => match crate::units::parse(text, *dimension) {
@@ -165,7 +164,6 @@ impl<'a> Section<'a> {
     }
 
     fn whole(&self, node: &Node, name: &str, kind: &Kind, min: u64) -> Option<u64> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let value = match node.value {
             Value::Integer(v) => u64::try_from(v).ok(),
             // 1e5 is a float to TOML and a count to people.
