@@ -10,14 +10,17 @@ pub mod keys;
 mod particles;
 mod programme;
 mod radius;
+mod reference;
 mod resolved;
 pub mod schema;
 mod section;
 mod settings;
+pub mod sheet;
 mod stages;
 mod values;
 
 pub use build::load;
+pub use reference::{example, reference_markdown};
 
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;
