@@ -1,12 +1,10 @@
 //! The command line as typed, and what each subcommand calls.
 
-use crate::bench::{self, BenchOptions};
-use crate::config::{self, Config, ConfigOptions};
+use crate::config::{self, Config};
 use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
 use crate::output::{checkpoint, plot};
 use crate::run::{self, Outcome, RunOptions};
-use crate::verify;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,17 +53,6 @@ struct InputArguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Validate a configuration and print the pre-run sheet.
-    Check {
-        /// Configuration file (TOML).
-        config: PathBuf,
-        #[command(flatten)]
-        input: InputArguments,
-    },
-    /// Print a commented example configuration.
-    Init,
-    /// Print the input reference as Markdown.
-    Reference,
     /// Draw the plots of a run directory.
     Plot {
         /// Run directory.
@@ -76,25 +63,11 @@ enum Command {
         /// Run directory or checkpoint file.
         path: PathBuf,
     },
-    /// Run the analytic cases and print claim, expected, got, pass or fail.
-    Verify {
-        /// Run only the cases whose name contains this.
-        filter: Option<String>,
-    },
-    /// Measure speed: particle-steps/s on a jammed periodic packing.
-    Bench(BenchOptions),
 }
 
 impl InputArguments {
     fn load(&self, path: &Path) -> Result<Config> {
-        config::load(
-            path,
-            &ConfigOptions {
-                overrides: self.set.clone(),
-                output: self.output.clone(),
-                threads: self.threads.map(usize::from),
-            },
-        )
+        config::load(path, &self.set, self.output.as_deref(), self.threads.map(usize::from))
     }
 }
 
@@ -114,23 +87,12 @@ pub fn main() -> i32 {
         None => return parallel(|comm| run_command(comm, &arguments.run)),
     };
     let done = match command {
-        Command::Check { config, input } => input.load(&config).map(|config| print!("{}", config::sheet::sheet(&config))),
-        Command::Init => {
-            print!("{}", config::example());
-            Ok(())
-        }
-        Command::Reference => {
-            print!("{}", config::reference_markdown());
-            Ok(())
-        }
         Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
             for file in files {
                 println!("{}", file.display());
             }
         }),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
-        Command::Verify { filter } => return verify::main(filter.as_deref()),
-        Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
     };
     match done {
         Ok(()) => 0,

@@ -1,6 +1,7 @@
 //! dem-mpi: the discrete element method for battery electrodes and granular matter, parallel over
 //! MPI ranks and threads, with the same bits on every machine shape. See `ARCHITECTURE.md`.
 
+pub mod cli;
 pub mod config;
 pub mod contact;
 pub mod error;
@@ -11,6 +12,7 @@ pub mod load;
 pub mod neighbour;
 pub mod output;
 pub mod packing;
+pub mod run;
 pub mod setup;
 pub mod simulation;
 pub mod state;

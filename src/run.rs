@@ -3,7 +3,7 @@
 mod output;
 mod signals;
 
-use crate::config::{Config, Interval};
+use crate::config::Config;
 use crate::error::Result;
 use crate::exchange::{Communicator, agree};
 use crate::force::observe::Wanted;
@@ -11,8 +11,7 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
-use crate::state::GlobalState;
-use output::RunOutput;
+use output::{RunOutput, is_due};
 use signals::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,8 +59,8 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
     let initial = setup::onto_first(comm, ranks, initial)?;
     let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
-    let restarted = options.restart.is_some();
-    agree(&active, prepare_directory(&active, config, restarted, &initial.global))?;
+    let prepared = if active.rank() == 0 { output::prepare_directory(config) } else { Ok(()) };
+    agree(&active, prepared)?;
     let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
     Run::new(simulation, Arc::clone(config))?.to_the_end()
 }
@@ -85,36 +84,24 @@ fn automatic_threads(ranks: usize) -> usize {
 }
 
 fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<Initial> {
-    let found = if comm.rank() == 0 { checkpoint_file(path).map(Some) } else { Ok(None) };
-    let mut bytes = agree(comm, found)?.map(|file| file.into_os_string().into_encoded_bytes()).unwrap_or_default();
-    comm.broadcast(0, &mut bytes);
-    let file = PathBuf::from(String::from_utf8_lossy(&bytes).into_owned());
-    let read = checkpoint::read(comm, &file)?;
-    if comm.rank() == 0 {
-        eprintln!("dem-mpi: restart from {} (step {}, time {:.6e} s)", file.display(), read.global.step, read.global.time);
-    }
-    agree(comm, setup::from_checkpoint(config, read))
-}
-
-fn checkpoint_file(path: &Path) -> Result<PathBuf> {
+    let mut file = path.to_path_buf();
     if path.is_dir() {
-        let latest = checkpoint::latest(path)?;
-        for warning in &latest.warnings {
+        let latest = checkpoint::latest(comm, path)?;
+        for warning in latest.warnings.iter().filter(|_| comm.rank() == 0) {
             eprintln!("dem-mpi: warning: {warning}");
         }
-        Ok(latest.path)
-    } else {
-        Ok(path.to_path_buf())
+        file = latest.path;
     }
-}
-
-/// Rank 0: the run directory with the resolved input; on restart tables and snapshots cut to the
-/// checkpoint, so that the directory equals that of an uninterrupted run.
-fn prepare_directory(comm: &Communicator, config: &Config, restarted: bool, global: &GlobalState) -> Result<()> {
-    if comm.rank() != 0 {
-        return Ok(());
+    let read = checkpoint::read(comm, &file)?;
+    if comm.rank() == 0 {
+        eprintln!(
+            "dem-mpi: restart from {} (step {}, time {:.6e} s)",
+            file.display(),
+            read.global.step,
+            read.global.time
+        );
     }
-    output::prepare_directory(config, restarted, global)
+    agree(comm, setup::from_checkpoint(config, read))
 }
 
 /// A run in progress on one rank.
@@ -133,7 +120,15 @@ impl Run {
         let output = RunOutput::new(&simulation, &config)?;
         let signals = agree(simulation.comm(), Signals::listen())?;
         let first_step = simulation.global().step;
-        Ok(Self { simulation, config, output, signals, started: Instant::now(), first_step, last_checkpoint: Instant::now() })
+        Ok(Self {
+            simulation,
+            config,
+            output,
+            signals,
+            started: Instant::now(),
+            first_step,
+            last_checkpoint: Instant::now(),
+        })
     }
 
     fn to_the_end(mut self) -> Result<Outcome> {
@@ -141,7 +136,8 @@ impl Run {
             let wanted = self.wanted();
             let requests = self.requests();
             let Self { simulation, output, .. } = &mut self;
-            let agreed = simulation.step(wanted, requests, |simulation, report| output.write(simulation, report, wanted))?;
+            let agreed =
+                simulation.step(wanted, requests, |simulation, report| output.write(simulation, report, wanted))?;
             let step = self.simulation.global().step;
             let every = self.config.output.checkpoint_steps;
             if agreed.stop != 0.0 {
@@ -150,7 +146,7 @@ impl Run {
             if agreed.checkpoint != 0.0 || (every != 0 && step.is_multiple_of(every)) {
                 self.checkpoint()?;
             }
-            self.output.progress(&mut self.simulation);
+            self.output.progress(&self.simulation);
         }
         self.finish()
     }
@@ -207,14 +203,5 @@ impl Run {
         let steps = self.simulation.global().step - self.first_step;
         self.output.finish(&self.simulation, &digest, self.started.elapsed(), steps)?;
         Ok(Outcome::Finished)
-    }
-}
-
-/// Row number `written` is due at `written` intervals.
-fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
-    match every {
-        Interval::Steps(steps) => global.step >= written * steps,
-        // A hair early, so that rounding of the time does not cost a step.
-        Interval::Time(time) => global.time >= written as f64 * time * (1.0 - 1e-9),
     }
 }

@@ -19,6 +19,12 @@ pub struct Communicator {
     backend: Rc<Backend>,
 }
 
+impl std::fmt::Debug for Communicator {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(formatter, "rank {} of {}", self.rank(), self.size())
+    }
+}
+
 enum Backend {
     Single,
     #[cfg(feature = "mpi")]

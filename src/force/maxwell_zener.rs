@@ -6,7 +6,7 @@ use super::lane::Lane;
 use super::law::{Column, Energies, NormalLaw, NormalResponse, Touch};
 use super::registry::{LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use crate::config::PairConfig;
+use crate::config::{MaxwellBranch, PairConfig};
 
 /// Most Maxwell branches that a material may have.
 pub const MAX_BRANCHES: usize = 8;
@@ -55,6 +55,16 @@ fn check(properties: &PairProperties) -> Result<(), String> {
     Ok(())
 }
 
+/// The branches with the last one split into equal ones of the same relaxation time, `count` in all: the
+/// same material, carried by one of the few branch numbers that are compiled.
+#[must_use]
+pub fn split_last_branch(branches: &[MaxwellBranch], count: usize) -> Vec<MaxwellBranch> {
+    let Some((last, others)) = branches.split_last() else { return Vec::new() };
+    let parts = count.saturating_sub(others.len()).max(1);
+    let part = MaxwellBranch { modulus: last.modulus / parts as f64, ..*last };
+    others.iter().copied().chain(std::iter::repeat_n(part, parts)).collect()
+}
+
 /// Maxwell–Zener contact: `F(t) = √R_eff/(1−ν²) · Σ_k E_k ∫ exp(−(t−s)/τ_k) √δ δ̇ ds`, the sum over the
 /// Maxwell branches and the long-term spring (τ = ∞).
 ///
@@ -97,15 +107,15 @@ pub struct MaxwellZener<const BRANCHES: usize> {
 }
 
 impl<const BRANCHES: usize> MaxwellZener<BRANCHES> {
-    /// From the pair's constants and the normal law's parameters. `BRANCHES` is the number of the
-    /// material's Maxwell branches (`exact`) or one more (`midpoint`).
+    /// From the pair's constants and the normal law's parameters. `BRANCHES` is at least the number of
+    /// the material's Maxwell branches (`exact`) or one more than that (`midpoint`).
     #[must_use]
     pub fn new(pair: &PairConfig) -> Self {
         let properties = &pair.properties;
         let per_young = 2.0 / 3.0 / (1.0 - properties.poisson_ratio[0] * properties.poisson_ratio[0]);
         let long_term = per_young * properties.young_modulus[0];
-        let branches = &properties.maxwell[0];
-        let midpoint = pair.normal.word(SCHEME.name) == "midpoint";
+        let midpoint = is_midpoint(pair);
+        let branches = split_last_branch(&properties.maxwell[0], if midpoint { BRANCHES - 1 } else { BRANCHES });
         let coefficient =
             std::array::from_fn(|k| branches.get(k).map_or(long_term, |branch| branch.modulus * per_young));
         let spring = if midpoint { 0.0 } else { long_term };
@@ -132,27 +142,31 @@ pub fn mean_decay(x: f64) -> f64 {
     if x > 0.0 { -libm::expm1(-x) / x } else { 1.0 }
 }
 
-/// Hands the law of a pair to the visitor.
+/// Hands the law of a pair to the visitor. Compiled are 1, 2, 4 and 8 branches; a number between is
+/// carried by the next one (see [`split_last_branch`]).
 pub fn build<V: NormalVisitor>(pair: &PairConfig, visitor: V) -> V::Output {
-    let branches = pair.properties.maxwell[0].len();
-    macro_rules! with_branches {
-        ($($count:literal => $exact:literal, $one_more:literal;)*) => {
-            match (branches, pair.normal.word(SCHEME.name)) {
-                $(
-                    ($count, "exact") => visitor.visit(
-                        MaxwellZener::<$exact>::new(pair),
-                        ShearSprings::<$one_more>::relaxing(&pair.properties),
-                    ),
-                    ($count, _) => visitor.visit(
-                        MaxwellZener::<$one_more>::new(pair),
-                        ShearSprings::<$one_more>::relaxing(&pair.properties),
-                    ),
-                )*
-                _ => panic!("maxwell_zener built with {branches} branches, which its check refuses"),
-            }
+    let properties = &pair.properties;
+    let branches = properties.maxwell[0].len();
+    macro_rules! law {
+        ($branches:literal, $springs:literal) => {
+            visitor.visit(MaxwellZener::<$branches>::new(pair), ShearSprings::<$springs>::relaxing(properties))
         };
     }
-    with_branches! { 1 => 1, 2; 2 => 2, 3; 3 => 3, 4; 4 => 4, 5; 5 => 5, 6; 6 => 6, 7; 7 => 7, 8; 8 => 8, 9; }
+    match (branches, is_midpoint(pair)) {
+        (1, false) => law!(1, 2),
+        (2, false) => law!(2, 3),
+        (3..=4, false) => law!(4, 5),
+        (5..=8, false) => law!(8, 9),
+        (1, true) => law!(2, 2),
+        (2, true) => law!(3, 3),
+        (3..=4, true) => law!(5, 5),
+        (5..=8, true) => law!(9, 9),
+        _ => panic!("maxwell_zener built with {branches} branches, which its check refuses"),
+    }
+}
+
+fn is_midpoint(pair: &PairConfig) -> bool {
+    pair.normal.word(SCHEME.name) == "midpoint"
 }
 
 impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {

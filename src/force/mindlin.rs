@@ -190,3 +190,6 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         VectorResponse { value, energies }
     }
 }
+
+#[cfg(test)]
+mod tests;

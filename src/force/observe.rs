@@ -48,6 +48,8 @@ pub struct Sample {
     pub force: [f64; 3],
     /// Normal force \[N\].
     pub normal_force: f64,
+    /// Distances of the contact point from the two centres \[m\].
+    pub arms: [f64; 2],
     /// Counted here: the lower id is owned by this rank.
     pub counted: bool,
     /// The second is this wall.

@@ -1,7 +1,7 @@
 //! The loop around the laws, written once and monomorphised per composition: records in, one output
 //! line per contact out, memory updated in place.
 
-use super::composition;
+use super::composition::{self, MAX_MEMORY};
 use super::geometry::{self, CellMotion, PairTouch};
 use super::lane::{cross, dot, scale, sub};
 use super::law::{Column, ContactLaw, ContactResponse, LawVisitor, Touch};
@@ -10,8 +10,6 @@ use crate::config::PairConfig;
 use crate::contact::list::{BLOCK, Partners, Section};
 use crate::state::particles::Record;
 
-/// Most memory columns of a composition.
-const MAX_COLUMNS: usize = 48;
 /// Contacts that one thread takes at least.
 const GRAIN: usize = 2048;
 
@@ -90,7 +88,6 @@ struct Builder;
 impl LawVisitor for Builder {
     type Output = Box<dyn PairPass>;
     fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        assert!(C::MEMORY <= MAX_COLUMNS, "a law has more than {MAX_COLUMNS} memory columns");
         Box::new(LawPass { law })
     }
 }
@@ -141,7 +138,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             relative_spin: [0.0; 3],
             mean_spin: [0.0; 3],
         };
-        let mut memory = [0.0; MAX_COLUMNS];
+        let mut memory = [0.0; MAX_MEMORY];
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
     }
 
@@ -240,7 +237,7 @@ impl<C: ContactLaw> LawPass<C> {
             if !within && result.fault.is_none() {
                 result.fault = Some((slice.place + place, pair.touch.overlap / pair.min_radius));
             }
-            let mut memory = [0.0; MAX_COLUMNS];
+            let mut memory = [0.0; MAX_MEMORY];
             for (column, value) in memory[..C::MEMORY].iter_mut().enumerate() {
                 *value = slice.memory[start + column * BLOCK];
             }
@@ -262,6 +259,7 @@ impl<C: ContactLaw> LawPass<C> {
                     overlap: pair.touch.overlap,
                     force: scale(force, -1.0),
                     normal_force: response.normal_force,
+                    arms: [pair.arm_first, pair.arm_second],
                     counted: (slice.first[place] as usize) < input.owned,
                     wall: if WALL { Some(slice.second[place] as usize) } else { None },
                 };

@@ -6,8 +6,8 @@ use super::shear::ShearSprings;
 use super::{hertz, maxwell_zener, mindlin, rolling};
 use crate::config::{MaxwellBranch, PairConfig};
 
-/// From one line per law, the list of laws and the match that builds them. A law's module holds
-/// `ENTRY` and `build`.
+/// From one line per law, the list of laws and the match that builds them. A law's module holds `ENTRY`,
+/// the law as input and documentation see it, and `build`, which hands the concrete law to a visitor.
 macro_rules! register {
     (normal: $($normal:ident)*; tangential: $($tangential:ident)*; rolling: $($rolling:ident)*;) => {
         static LAWS: &[LawEntry] = &[$($normal::ENTRY,)* $($tangential::ENTRY,)* $($rolling::ENTRY,)*];

@@ -171,3 +171,6 @@ impl RollingLaw for SpringSlider {
         VectorResponse { value: add(rolling, scale(touch.normal, twisting)), energies }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,6 @@
 //! The shear springs that go with a normal law: what a tangential law needs to know of the bulk.
 
+use super::maxwell_zener::split_last_branch;
 use super::registry::PairProperties;
 
 /// The shear moduli of a pair, one relaxing set in parallel: `COUNT` springs of which those with a
@@ -27,15 +28,15 @@ impl ShearSprings<1> {
 }
 
 impl<const COUNT: usize> ShearSprings<COUNT> {
-    /// The springs of a pair of equal materials with `COUNT − 1` Maxwell branches:
-    /// `G_k = E_k/(4(1+ν)(2−ν))` with the branches' own τ_k, the long-term spring last.
+    /// The springs of a pair of equal materials with up to `COUNT − 1` Maxwell branches (the last one split
+    /// as in the normal law, [`split_last_branch`]): `G_k = E_k/(4(1+ν)(2−ν))` with the branches' own τ_k, the long-term spring last.
     ///
     /// # Source
-    /// PHYSICS of the tangential law: the tangential spring relaxes as the normal one (W 3.9 for G).
+    /// W (3.9) with the erratum for G of each modulus.
     #[must_use]
     pub fn relaxing(properties: &PairProperties) -> Self {
         let long_term = properties.effective_shear_modulus();
-        let branches = &properties.maxwell[0];
+        let branches = split_last_branch(&properties.maxwell[0], COUNT - 1);
         let per_young = long_term / properties.young_modulus[0];
         Self {
             modulus: std::array::from_fn(|k| branches.get(k).map_or(long_term, |branch| branch.modulus * per_young)),

@@ -22,7 +22,10 @@ impl Signals {
         let received = Arc::new(AtomicUsize::new(0));
         for signal in [SIGINT, SIGTERM, SIGUSR1] {
             signal_hook::flag::register_usize(signal, Arc::clone(&received), signal as usize).map_err(|error| {
-                Error::File { path: PathBuf::from("signals"), message: format!("cannot handle signal {signal}: {error}") }
+                Error::File {
+                    path: PathBuf::from("signals"),
+                    message: format!("cannot handle signal {signal}: {error}"),
+                }
             })?;
         }
         Ok(Self(received))

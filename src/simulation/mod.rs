@@ -5,6 +5,7 @@ mod contacts;
 mod fault;
 mod lists;
 mod report;
+mod snapshot;
 mod timers;
 
 pub use report::Report;
@@ -174,6 +175,12 @@ impl Simulation {
     /// Time per stage, for stages outside the step.
     pub fn timers_mut(&mut self) -> &mut Timers {
         &mut self.timers
+    }
+
+    /// Threads of this rank.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
     }
 
     /// Warnings since the last call.

@@ -1,0 +1,209 @@
+//! What a run writes while it goes: history, snapshots, the terminal, the tables at its end.
+
+use crate::config::{AxisControl, Config, Interval};
+use crate::error::{Error, Result};
+use crate::exchange::agree;
+use crate::force::observe::Wanted;
+use crate::output::digest::Digest;
+use crate::output::history::HistoryWriter;
+use crate::output::log::{Log, RunSize, StageTimes, cost_table};
+use crate::output::plot;
+use crate::output::snapshot::{Moment, SnapshotSeries};
+use crate::simulation::{Report, Simulation, Stage, Timers};
+use crate::state::GlobalState;
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Steps between looks at the progress bar.
+const PROGRESS_STEPS: u64 = 256;
+
+/// Rank 0 makes the run directory with the resolved input.
+///
+/// # Errors
+/// The directory cannot be made or written.
+pub fn prepare_directory(config: &Config) -> Result<()> {
+    let directory = &config.output.directory;
+    let failed = |attempt: &str, path: &Path, error: std::io::Error| Error::File {
+        path: path.to_path_buf(),
+        message: format!("cannot {attempt} ({error}); choose another output.directory or free the disk"),
+    };
+    fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, error))?;
+    let path = directory.join("config.resolved.toml");
+    fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, error))
+}
+
+/// Open output of a run on one rank.
+pub struct RunOutput {
+    config: Arc<Config>,
+    history: Option<HistoryWriter>,
+    snapshots: Option<SnapshotSeries>,
+    log: Option<Log>,
+}
+
+impl RunOutput {
+    /// Open history and snapshots: new, or cut to what the state has counted (restart). Collective.
+    ///
+    /// # Errors
+    /// Files cannot be made, or hold less than the checkpoint counts.
+    pub fn new(simulation: &Simulation, config: &Arc<Config>) -> Result<Self> {
+        let (comm, global) = (simulation.comm(), simulation.global());
+        let directory = &config.output.directory;
+        let first = comm.rank() == 0;
+        let opened = match (first, global.history_rows) {
+            (false, _) => Ok(None),
+            (true, 0) => HistoryWriter::create(directory).map(Some),
+            (true, rows) => HistoryWriter::resume(directory, rows).map(Some),
+        };
+        let history = agree(comm, opened)?;
+        let snapshots = match config.output.snapshots {
+            Some(_) => Some(SnapshotSeries::resume(comm, directory, global.snapshots)?),
+            None => None,
+        };
+        Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new) })
+    }
+
+    /// Write what was wanted of a report. Collective.
+    ///
+    /// # Errors
+    /// The disk does not take it; the same error on every rank.
+    pub fn write(&mut self, simulation: &mut Simulation, report: &Report, wanted: Wanted) -> Result<()> {
+        simulation.timers_mut().start(Stage::Output);
+        for warning in simulation.take_warnings() {
+            if let Some(log) = &self.log {
+                log.line(&format!("warning: {warning}"));
+            }
+        }
+        if wanted.sums {
+            let written = self.history.as_mut().map_or(Ok(()), |history| history.write(&report.row));
+            agree(simulation.comm(), written)?;
+            let done = progress(&self.config, simulation.global());
+            if let Some(log) = &mut self.log {
+                log.row(&report.row, done);
+            }
+            simulation.global_mut().history_rows += 1;
+        }
+        if let Some(series) = self.snapshots.as_mut().filter(|_| wanted.samples) {
+            let global = simulation.global();
+            let moment = Moment { step: global.step, time: global.time, sides: global.sides };
+            let total = global.particles;
+            let contacts = self.config.output.snapshot_contacts.then(|| simulation.snapshot_contacts(&report.samples));
+            series.write(&moment, total, simulation.snapshot_particles(&report.samples), contacts)?;
+            simulation.global_mut().snapshots += 1;
+        }
+        simulation.timers_mut().stop();
+        Ok(())
+    }
+
+    /// Move the progress bar now and then.
+    pub fn progress(&mut self, simulation: &Simulation) {
+        let global = simulation.global();
+        if let Some(log) = self.log.as_ref().filter(|_| global.step.is_multiple_of(PROGRESS_STEPS)) {
+            let name = self.config.stages.get(global.stage).map_or("", |stage| stage.name.as_str());
+            log.progress(progress(&self.config, global), name);
+        }
+    }
+
+    /// A signal ended the run: say so, and leave a status file for the jobscript.
+    ///
+    /// # Errors
+    /// The status file cannot be written.
+    pub fn stopped(&mut self, simulation: &Simulation, checkpoint: &Path, requeue: bool) -> Result<()> {
+        let mut written = Ok(());
+        if let Some(log) = &mut self.log {
+            log.finish();
+            let state = if requeue { "requeue" } else { "stopped" };
+            println!(
+                "stopped by a signal at step {}; go on with --restart {}",
+                simulation.global().step,
+                self.config.output.directory.display()
+            );
+            written = self.status(state, &format!("checkpoint = {:?}\n", checkpoint.display().to_string()));
+        }
+        agree(simulation.comm(), written)
+    }
+
+    fn status(&self, state: &str, more: &str) -> Result<()> {
+        let path = self.config.output.directory.join("status.toml");
+        fs::write(&path, format!("state = \"{state}\"\n{more}")).map_err(|error| Error::File {
+            path,
+            message: format!("cannot write the status file ({error}); free the disk"),
+        })
+    }
+
+    /// The end of a run: digest, cost table, plots, status. Collective.
+    ///
+    /// # Errors
+    /// The plots or the status file cannot be written.
+    pub fn finish(&mut self, simulation: &Simulation, digest: &Digest, wall: Duration, steps: u64) -> Result<()> {
+        if let Some(log) = &mut self.log {
+            log.finish();
+        }
+        let size = RunSize {
+            particles: simulation.global().particles,
+            steps,
+            threads: simulation.threads(),
+            bytes: resident_bytes(),
+        };
+        let table = cost_table(simulation.comm(), &stage_times(simulation.timers(), wall), &size);
+        let mut written = Ok(());
+        if simulation.comm().rank() == 0 {
+            let started = Instant::now();
+            println!("\n{table}");
+            println!("digest {digest}");
+            written = self.status("finished", &format!("digest = \"{digest}\"\n"));
+            if self.config.output.plots && written.is_ok() {
+                written = plot::plot_run(&self.config.output.directory).map(|_| ());
+            }
+            println!(
+                "results in {} (plots took {:.1} s)",
+                self.config.output.directory.display(),
+                started.elapsed().as_secs_f64()
+            );
+        }
+        agree(simulation.comm(), written)
+    }
+}
+
+/// Share of the run that is done, as far as durations, strains and steps of the stages tell.
+fn progress(config: &Config, global: &GlobalState) -> f64 {
+    let length = |stage: &crate::config::Stage| {
+        let by_strain = stage.until_strain.and_then(|(axis, strain)| match stage.axes[axis] {
+            AxisControl::StrainRate(rate) if rate != 0.0 => Some((strain / rate).abs()),
+            _ => None,
+        });
+        stage.duration.or(by_strain)
+    };
+    let total: f64 = config.stages.iter().filter_map(length).sum();
+    if total > 0.0 {
+        return global.time / total;
+    }
+    let steps: u64 = config.stages.iter().filter_map(|stage| stage.steps).sum();
+    if steps > 0 { global.step as f64 / steps as f64 } else { 0.0 }
+}
+
+fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {
+    let [neighbours, contacts, gather_integrate, halo, reduce, output] = timers.seconds();
+    StageTimes { neighbours, contacts, gather_integrate, halo, reduce, output, total: wall.as_secs_f64() }
+}
+
+/// Resident memory of this process \[B\]; 0 where the system does not say.
+#[must_use]
+pub fn resident_bytes() -> u64 {
+    let pages = fs::read_to_string("/proc/self/statm")
+        .ok()
+        .and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok())
+        .unwrap_or(0);
+    pages * 4096
+}
+
+/// Row number `written` is due at `written` intervals.
+#[must_use]
+pub fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
+    match every {
+        Interval::Steps(steps) => global.step >= written * steps,
+        // A hair early, so that rounding of the time does not cost a step.
+        Interval::Time(time) => global.time >= written as f64 * time * (1.0 - 1e-9),
+    }
+}

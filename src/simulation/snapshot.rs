@@ -1,0 +1,62 @@
+//! What a snapshot shows of this rank's particles and contacts.
+
+use super::Simulation;
+use crate::force::observe::Sample;
+use crate::output::snapshot::{SnapshotContact, SnapshotContacts, SnapshotParticle};
+
+impl Simulation {
+    /// Owned particles with stress trace and coordination. The trace is that of the mean stress in the
+    /// particle, `(1/V) Σ arm·F_n` over its contacts \[Pa\], compression positive.
+    #[must_use]
+    pub fn snapshot_particles(&self, samples: &[Sample]) -> Vec<SnapshotParticle> {
+        let mut virials = vec![[0.0; 2]; self.contacts.lines];
+        for sample in samples {
+            virials[sample.line] = sample.arms.map(|arm| arm * sample.normal_force);
+        }
+        (0..self.particles.owned)
+            .map(|index| {
+                let record = &self.particles.record[index];
+                let volume = 4.0 / 3.0 * std::f64::consts::PI * (record.radius * record.radius * record.radius);
+                let ends = self.contacts.ends_of(index).iter();
+                let virial = ends.fold(0.0, |sum, end| sum + virials[end.line()][usize::from(end.is_second())]);
+                SnapshotParticle {
+                    id: self.particles.id[index],
+                    species: self.particles.species[index],
+                    position: record.position,
+                    radius: record.radius,
+                    orientation: self.particles.orientation[index],
+                    velocity: record.velocity,
+                    angular_velocity: record.spin,
+                    stress_trace: virial / volume,
+                    coordination: self.touching(index),
+                    reserved: 0,
+                }
+            })
+            .collect()
+    }
+
+    /// Touching contacts whose lower id this rank owns, with their memory.
+    #[must_use]
+    pub fn snapshot_contacts(&self, samples: &[Sample]) -> SnapshotContacts {
+        let width = self.model.lists.memory_width();
+        let mut shown =
+            SnapshotContacts { contacts: Vec::new(), width, memory: Vec::new(), columns: self.model.columns() };
+        let mut row = vec![0.0; width];
+        for sample in samples.iter().filter(|sample| sample.counted) {
+            let (number, place) = self.contacts.locate(sample.line);
+            let section = &self.contacts.sections[number];
+            row.fill(0.0);
+            section.read_memory(place, &mut row);
+            shown.memory.extend_from_slice(&row);
+            shown.contacts.push(SnapshotContact {
+                key: self.contacts.key(number, place, &self.particles, self.model.lists.total),
+                start: self.particles.record[section.first[place] as usize].position,
+                branch: sample.branch,
+                force: sample.force.map(|f| -f),
+                normal_force: sample.normal_force,
+                overlap: sample.overlap,
+            });
+        }
+        shown
+    }
+}
