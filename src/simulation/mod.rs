@@ -9,7 +9,7 @@ mod snapshot;
 mod timers;
 
 pub use report::Report;
-pub use timers::{Stage, Timers};
+pub use timers::{STAGES, Stage, Timers};
 
 use crate::config::{Config, Kinematics};
 use crate::contact::build::BuildContext;
