@@ -11,6 +11,7 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
+pub use output::resident_bytes;
 use output::{RunOutput, is_due};
 use signals::Signals;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,8 @@
 //! Reads contact laws and makes one law per pair of materials.
 
+use super::alternatives::Chosen;
 use super::schema::{Default, Key, Kind, Range, Table};
-use super::section::{Chosen, Section};
+use super::section::Section;
 use super::{Boundary, CellConfig, Material, PairConfig, Species};
 use crate::force::registry::{self, LawChoice, LawEntry, PairProperties, ParameterKind, ParameterValue, Role};
 use crate::units::Dimension;

@@ -1,6 +1,7 @@
 //! The checked input in SI units: what every later stage reads. Built by [`load`] from a TOML file;
 //! knows nothing of ranks or of the simulation's state.
 
+mod alternatives;
 mod build;
 mod contact;
 mod diagnostic;
@@ -9,13 +10,17 @@ pub mod keys;
 mod particles;
 mod programme;
 mod radius;
+mod reference;
 mod resolved;
 pub mod schema;
 mod section;
 mod settings;
+pub mod sheet;
 mod stages;
+mod values;
 
 pub use build::load;
+pub use reference::{example, reference_markdown};
 
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;

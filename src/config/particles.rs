@@ -1,8 +1,9 @@
 //! Reads materials and species.
 
+use super::alternatives::Chosen;
 use super::diagnostic::did_you_mean;
 use super::schema::quoted;
-use super::section::{Chosen, Section};
+use super::section::Section;
 use super::{Material, MaxwellBranch, Motion, RadiusDistribution, Species};
 
 /// All materials: their names (also of faulty ones, so that no reference to them looks wrong) and,
@@ -186,7 +187,6 @@ fn share(
 }
 
 /// Whole numbers that sum to `total` and are as near as can be to its shares.
-#[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 fn largest_remainders(total: u64, fractions: &[f64]) -> Vec<u64> {
     let exact: Vec<f64> = fractions.iter().map(|fraction| fraction * total as f64).collect();
     let mut counts: Vec<u64> = exact.iter().map(|share| libm::floor(*share) as u64).collect();
@@ -281,7 +281,7 @@ fn read_radius(chosen: Chosen) -> Option<RadiusDistribution> {
             }
             Some(RadiusDistribution::Tabulated { radius, weight })
         }
-        Chosen::Value(_, value) => value.map(RadiusDistribution::Fixed),
+        Chosen::Value(value) => value.map(RadiusDistribution::Fixed),
     }
 }
 

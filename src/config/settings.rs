@@ -1,9 +1,8 @@
 //! Reads cell, packing, time step, output and parallel layout.
 
-use super::section::{Chosen, Section};
-use super::{
-    Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, RadiusDistribution, Species, TimeStepConfig,
-};
+use super::alternatives::Chosen;
+use super::section::Section;
+use super::{Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, Species, TimeStepConfig};
 use std::path::{Path, PathBuf};
 
 /// Read `[cell]`.
@@ -67,7 +66,7 @@ pub(super) fn read_packing(root: &Section, folder: &Path) -> Option<PackingConfi
                 max_moves_per_particle: max_moves_per_particle?,
             })
         }
-        Chosen::Value(..) => None,
+        Chosen::Value(_) => None,
     }
 }
 
@@ -87,7 +86,6 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         }
         return;
     }
-    #[allow(clippy::cast_precision_loss)]
     let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
@@ -115,7 +113,7 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
 /// Read `[time_step]`.
 pub(super) fn read_time_step(root: &Section) -> Option<TimeStepConfig> {
     match root.choose("time_step")? {
-        Chosen::Value(_, value) => value.map(TimeStepConfig::Fixed),
+        Chosen::Value(value) => value.map(TimeStepConfig::Fixed),
         Chosen::Table(_, section) => {
             let (safety, reference_overlap) = (section.number("safety"), section.number("reference_overlap"));
             Some(TimeStepConfig::Automatic { safety: safety?, reference_overlap: reference_overlap? })
@@ -167,17 +165,4 @@ pub(super) fn read_parallel(root: &Section) -> Option<ParallelConfig> {
         skin: skin?,
         min_particles_per_rank: usize::try_from(min_particles_per_rank?).ok()?,
     })
-}
-
-impl RadiusDistribution {
-    /// One word for tables.
-    #[must_use]
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Fixed(_) => "fixed",
-            Self::Normal { .. } => "normal",
-            Self::Lognormal { .. } => "lognormal",
-            Self::Tabulated { .. } => "tabulated",
-        }
-    }
 }

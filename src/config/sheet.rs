@@ -1,0 +1,387 @@
+//! The pre-run sheet: what a run will be like, from the input alone. All numbers are estimates for
+//! the reader's judgement; no simulation reads them.
+
+use super::programme::{Progress, advance};
+use super::{AxisControl, Config, Material, PackingConfig, PairConfig, Species, TimeStepConfig};
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+
+/// Memory of a particle with its contacts and lists \[bytes\], as measured on dense packings.
+const BYTES_PER_PARTICLE: f64 = 450.0;
+/// Contacts per particle times two in a dense packing.
+const COORDINATION: f64 = 6.0;
+/// Solid fraction assumed where random close packing finds its own.
+const RANDOM_CLOSE: f64 = 0.635;
+/// Largest ε̇²·density_scaling \[1/s²\] at which packings near jamming still answer quasi-statically.
+const INERTIA_LIMIT: f64 = 1e4;
+
+/// The sheet as an aligned table with warnings below it.
+#[must_use]
+pub fn sheet(config: &Config) -> String {
+    let estimate = Estimate::new(config);
+    let mut table = Table::default();
+    particles(&mut table, config, &estimate);
+    times(&mut table, config, &estimate);
+    regime(&mut table, config, &estimate);
+    let mut text = format!("{}\n\n", config.title);
+    let width = table.rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    for (name, value) in &table.rows {
+        let _ = writeln!(text, "{name:<width$}  {value}");
+    }
+    for warning in warnings(config, &estimate) {
+        let _ = writeln!(text, "\nwarning: {warning}");
+    }
+    text
+}
+
+#[derive(Default)]
+struct Table {
+    rows: Vec<(String, String)>,
+}
+
+impl Table {
+    fn row(&mut self, name: impl Into<String>, value: impl Into<String>) {
+        self.rows.push((name.into(), value.into()));
+    }
+}
+
+/// What several rows need.
+struct Estimate {
+    count: f64,
+    solid_volume: f64,
+    solid_fraction: Option<f64>,
+    /// Largest overlap expected over radius, and where it comes from.
+    overlap: f64,
+    overlap_cause: &'static str,
+    /// Largest strain rate of the programme \[1/s\].
+    rate: f64,
+    progress: Progress,
+    /// Impact velocity expected \[m/s\].
+    velocity: f64,
+    inertial_pressure: f64,
+}
+
+impl Estimate {
+    fn new(config: &Config) -> Self {
+        let count: f64 = config.species.iter().map(|s| s.count as f64).sum();
+        let solid_volume: f64 = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
+        let solid_fraction = match (config.cell.sides, &config.packing) {
+            (Some(_), PackingConfig::File { .. }) => None,
+            (Some(sides), PackingConfig::RandomClose { .. }) => Some(solid_volume / (sides[0] * sides[1] * sides[2])),
+            (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
+        };
+        let mut progress = Progress::default();
+        let (mut strain, mut rate, mut stress) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for stage in &config.stages {
+            advance(&mut progress, stage);
+            for axis in 0..3 {
+                strain = strain.max(progress.strain[axis].unwrap_or(0.0));
+                match stage.axes[axis] {
+                    AxisControl::StrainRate(value) => rate = rate.max(value.abs()),
+                    AxisControl::Stress { target, max_rate } => {
+                        rate = rate.max(max_rate);
+                        stress = stress.max(target);
+                    }
+                }
+            }
+            stress = stress.max(stage.until_stress.map_or(0.0, |(_, value)| value));
+        }
+        let largest = config.species.iter().map(|s| s.radius.max()).fold(0.0, f64::max);
+        let initial = config.species.iter().map(|s| norm(s.velocity) + 3.0 * s.velocity_deviation).fold(0.0, f64::max);
+        let velocity = initial.max(rate * 2.0 * largest);
+        let fraction = solid_fraction.unwrap_or(RANDOM_CLOSE);
+        // Radius over radius: strain ε brings centres 2R apart closer by 2εR.
+        let mut overlap = (2.0 * strain, "strain");
+        for meeting in Meeting::all(config) {
+            let under_stress =
+                meeting.overlap_under(force_of_pressure(stress, fraction, meeting.radius)) / meeting.radius;
+            let of_impact = meeting.overlap_of_impact(2.0 * initial) / meeting.radius;
+            for candidate in [(under_stress, "stress"), (of_impact, "initial velocity")] {
+                if candidate.0 > overlap.0 {
+                    overlap = candidate;
+                }
+            }
+        }
+        let inertial_pressure = Meeting::all(config)
+            .map(|meeting| pressure_of_force(meeting.force(overlap.0 * meeting.radius), fraction, meeting.radius))
+            .fold(0.0, f64::max);
+        Self {
+            count,
+            solid_volume,
+            solid_fraction,
+            overlap: overlap.0,
+            overlap_cause: overlap.1,
+            rate,
+            progress,
+            velocity,
+            inertial_pressure,
+        }
+    }
+}
+
+/// Force per contact under a pressure, `4πR²p/(Zφ)`, and back.
+fn force_of_pressure(pressure: f64, fraction: f64, radius: f64) -> f64 {
+    4.0 * PI * radius * radius * pressure / (COORDINATION * fraction)
+}
+
+fn pressure_of_force(force: f64, fraction: f64, radius: f64) -> f64 {
+    COORDINATION * fraction * force / (4.0 * PI * radius * radius)
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+/// Spontaneous Young's modulus: long-term spring and all branches.
+fn spontaneous(young_modulus: f64, maxwell: &[super::MaxwellBranch]) -> f64 {
+    young_modulus + maxwell.iter().map(|branch| branch.modulus).sum::<f64>()
+}
+
+fn smallest_mass(species: &Species, material: &Material) -> f64 {
+    let radius = species.radius.min();
+    4.0 / 3.0 * PI * radius * radius * radius * material.density * material.density_scaling
+}
+
+/// Two species in contact, with spontaneous moduli.
+struct Meeting<'a> {
+    pair: &'a PairConfig,
+    modulus: f64,
+    effective_radius: f64,
+    effective_mass: f64,
+    /// The smaller of the two largest radii \[m\].
+    radius: f64,
+}
+
+impl<'a> Meeting<'a> {
+    fn all(config: &'a Config) -> impl Iterator<Item = Self> {
+        let species = &config.species;
+        (0..species.len())
+            .flat_map(move |a| (a..species.len()).map(move |b| Self::new(config, &species[a], &species[b])))
+    }
+
+    fn new(config: &'a Config, a: &Species, b: &Species) -> Self {
+        let pair = &config.pairs[config.pair_index(a.material, b.material)];
+        let compliance = [a, b].map(|s| {
+            let material = &config.materials[s.material];
+            (1.0 - material.poisson_ratio * material.poisson_ratio)
+                / spontaneous(material.young_modulus, &material.maxwell)
+        });
+        let radii = [a.radius.max(), b.radius.max()];
+        let masses = [a, b].map(|s| smallest_mass(s, &config.materials[s.material]));
+        Self {
+            pair,
+            modulus: 1.0 / (compliance[0] + compliance[1]),
+            effective_radius: radii[0] * radii[1] / (radii[0] + radii[1]),
+            effective_mass: masses[0] * masses[1] / (masses[0] + masses[1]),
+            radius: radii[0].min(radii[1]),
+        }
+    }
+
+    /// Tangent stiffness `2 E_eff √(R_eff δ)` \[N/m\].
+    fn stiffness(&self, overlap: f64) -> f64 {
+        2.0 * self.modulus * (self.effective_radius * overlap).sqrt()
+    }
+
+    /// Hertz force \[N\].
+    fn force(&self, overlap: f64) -> f64 {
+        self.stiffness(overlap) * overlap * 2.0 / 3.0
+    }
+
+    fn overlap_under(&self, force: f64) -> f64 {
+        let scaled = 0.75 * force / (self.modulus * self.effective_radius.sqrt());
+        libm::pow(scaled, 2.0 / 3.0)
+    }
+
+    /// Largest overlap of an elastic impact, `(15 m_eff v²/(16 E_eff √R_eff))^{2/5}` \[m\].
+    fn overlap_of_impact(&self, velocity: f64) -> f64 {
+        let energy = self.effective_mass * velocity * velocity;
+        libm::pow(15.0 * energy / (16.0 * self.modulus * self.effective_radius.sqrt()), 0.4)
+    }
+}
+
+/// `β √(m_min/K_max)` at this overlap over radius, and the pair that sets K.
+fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, String)> {
+    let mass =
+        config.species.iter().map(|s| smallest_mass(s, &config.materials[s.material])).fold(f64::INFINITY, f64::min);
+    let stiffest = Meeting::all(config)
+        .map(|meeting| (meeting.stiffness(overlap * meeting.radius), meeting.pair.properties.names.join("-")))
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (stiffest.0 > 0.0).then(|| (safety * (mass / stiffest.0).sqrt(), stiffest.1))
+}
+
+fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
+    if let PackingConfig::File { path } = &config.packing {
+        table.row("particles", format!("from {}", path.display()));
+    } else {
+        table.row("particles", format!("{}", estimate.count));
+        let mass = |scaled: bool| -> f64 {
+            let of = |s: &Species| {
+                let material = &config.materials[s.material];
+                let density = material.density * if scaled { material.density_scaling } else { 1.0 };
+                s.count as f64 * s.radius.mean_volume() * density
+            };
+            config.species.iter().map(of).sum()
+        };
+        table.row("mass", format!("{} (in motion: {})", quantity(mass(false), "kg"), quantity(mass(true), "kg")));
+        table.row(
+            "contacts expected",
+            format!("{:.0} (coordination {COORDINATION})", estimate.count * COORDINATION / 2.0),
+        );
+        let bytes = estimate.count * BYTES_PER_PARTICLE;
+        table.row("memory", format!("{:.1} MB ({BYTES_PER_PARTICLE} bytes per particle)", bytes / 1e6));
+    }
+    for species in &config.species {
+        let (mean, max, min) = (species.radius.mean(), species.radius.max(), species.radius.min());
+        let range =
+            if min < max { format!(", {} to {}", quantity(min, "m"), quantity(max, "m")) } else { String::new() };
+        table.row(
+            format!("radius of {}", species.name),
+            format!("{} {}{range}", quantity(mean, "m"), if min < max { "on average" } else { "" }),
+        );
+    }
+    let sides = config.cell.sides.or_else(|| {
+        let volume = estimate.solid_volume / estimate.solid_fraction?;
+        let [a, b, c] = config.cell.aspect;
+        let unit = libm::cbrt(volume / (a * b * c));
+        Some([a * unit, b * unit, c * unit])
+    });
+    if let Some(sides) = sides {
+        let text = sides.map(|side| quantity(side, "m")).join(" × ");
+        table.row("cell", if config.cell.sides.is_some() { text } else { format!("about {text}") });
+    }
+    if let Some(fraction) = estimate.solid_fraction {
+        table.row("solid fraction", format!("{fraction:.3}"));
+    }
+}
+
+fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
+    let (safety, reference) = match config.time_step {
+        TimeStepConfig::Automatic { safety, reference_overlap } => (safety, reference_overlap),
+        TimeStepConfig::Fixed(_) => (0.17, 1e-3),
+    };
+    let steps_at = [("reference", reference), ("expected", estimate.overlap)]
+        .map(|(name, overlap)| automatic_step(config, safety, overlap).map(|(step, pair)| (name, overlap, step, pair)));
+    for (name, overlap, step, pair) in steps_at.iter().flatten() {
+        let text = format!("{}, limited by K of {pair} at overlap/radius {overlap:.1e}", quantity(*step, "s"));
+        table.row(format!("automatic Δt at {name} overlap"), text);
+    }
+    if let TimeStepConfig::Fixed(step) = config.time_step {
+        table.row("Δt", format!("{} (fixed)", quantity(step, "s")));
+    }
+    table.row("Rayleigh time", quantity(rayleigh_time(config), "s"));
+    match hertz_time(config, estimate.velocity) {
+        Some(time) => {
+            table.row(
+                "Hertz time",
+                format!("{} at {} (Δt must stay below half)", quantity(time, "s"), quantity(estimate.velocity, "m/s")),
+            );
+        }
+        None => table.row("Hertz time", "none: nothing moves at the start"),
+    }
+    let length = if estimate.progress.complete { "" } else { "at least " };
+    let time = estimate.progress.time;
+    table.row("time of all stages", format!("{length}{}", quantity(time, "s")));
+    let steps = match config.time_step {
+        TimeStepConfig::Fixed(step) => vec![time / step],
+        TimeStepConfig::Automatic { .. } => steps_at.iter().flatten().map(|(_, _, step, _)| time / step).collect(),
+    };
+    let counts: Vec<String> = steps.iter().map(|count| format!("{count:.2e}")).collect();
+    table.row("steps", format!("{length}{}", counts.join(" to ")));
+}
+
+/// Smallest `π R √(ρ/G)/(0.1631 ν + 0.8766)` over the species \[s\].
+fn rayleigh_time(config: &Config) -> f64 {
+    let of = |species: &Species| {
+        let m = &config.materials[species.material];
+        let shear = spontaneous(m.young_modulus, &m.maxwell) / (2.0 * (1.0 + m.poisson_ratio));
+        let slowness = (m.density * m.density_scaling / shear).sqrt();
+        PI * species.radius.min() * slowness / (0.1631 * m.poisson_ratio + 0.8766)
+    };
+    config.species.iter().map(of).fold(f64::INFINITY, f64::min)
+}
+
+/// Smallest duration of a contact, W (2.5), at this velocity \[s\].
+fn hertz_time(config: &Config, velocity: f64) -> Option<f64> {
+    let of = |species: &Species| {
+        let m = &config.materials[species.material];
+        let modulus = spontaneous(m.young_modulus, &m.maxwell);
+        let density = m.density * m.density_scaling;
+        let ratio =
+            5.0 * std::f64::consts::SQRT_2 * PI * density * (1.0 - m.poisson_ratio * m.poisson_ratio) / (4.0 * modulus);
+        2.94 * libm::pow(ratio, 0.4) * species.radius.min() / libm::pow(velocity, 0.2)
+    };
+    (velocity > 0.0).then(|| config.species.iter().map(of).fold(f64::INFINITY, f64::min))
+}
+
+fn regime(table: &mut Table, config: &Config, estimate: &Estimate) {
+    table.row("overlap/radius expected", format!("{:.2e} (from {})", estimate.overlap, estimate.overlap_cause));
+    if let Some(number) = inertial_number(config, estimate) {
+        table.row("inertial number", format!("{number:.1e} (quasi-static near jamming: below about 2e-5)"));
+    }
+    for material in &config.materials {
+        for branch in &material.maxwell {
+            let product = estimate.rate * branch.relaxation_time;
+            let text = format!("{product:.2e} (τ = {})", quantity(branch.relaxation_time, "s"));
+            table.row(format!("strain rate × τ of {}", material.name), text);
+        }
+    }
+    table.row(
+        "strain rate² × density scaling",
+        format!("{:.1e} 1/s² (quasi-static: below {INERTIA_LIMIT:.0e})", inertia(config, estimate)),
+    );
+}
+
+fn inertia(config: &Config, estimate: &Estimate) -> f64 {
+    let scaling = config.materials.iter().map(|m| m.density_scaling).fold(0.0, f64::max);
+    estimate.rate * estimate.rate * scaling
+}
+
+/// `ε̇ · 2R √(ρ/p)`, p from the expected overlap.
+fn inertial_number(config: &Config, estimate: &Estimate) -> Option<f64> {
+    let heaviest = |s: &Species| {
+        let material = &config.materials[s.material];
+        2.0 * s.radius.mean() * (material.density * material.density_scaling).sqrt()
+    };
+    let size = config.species.iter().map(heaviest).fold(0.0, f64::max);
+    (estimate.inertial_pressure > 0.0).then(|| estimate.rate * size / estimate.inertial_pressure.sqrt())
+}
+
+fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let inertia = inertia(config, estimate);
+    if inertia > INERTIA_LIMIT {
+        warnings.push(format!(
+            "strain rate² × density scaling is {inertia:.1e} 1/s²; above {INERTIA_LIMIT:.0e} inertia raises the stress of \
+             packings near jamming (1.25 to 1.5 times at 1e6): lower density_scaling or the strain rate"
+        ));
+    }
+    if estimate.overlap > config.max_overlap_fraction {
+        warnings.push(format!(
+            "the overlap expected, {:.2} of the radius, exceeds contact.max_overlap_fraction = {}: the run would stop",
+            estimate.overlap, config.max_overlap_fraction
+        ));
+    }
+    if let (TimeStepConfig::Fixed(step), Some((automatic, _))) =
+        (config.time_step, automatic_step(config, 0.17, estimate.overlap.max(1e-3)))
+        && step > automatic
+    {
+        warnings.push(format!(
+            "the fixed time step {} is larger than the automatic one, {}",
+            quantity(step, "s"),
+            quantity(automatic, "s")
+        ));
+    }
+    let held = config.species.iter().any(|s| matches!(s.motion, super::Motion::Driven { .. }));
+    for axis in (0..3).filter(|axis| config.gravity[*axis] != 0.0) {
+        if config.cell.boundary[axis] == super::Boundary::Periodic && !held {
+            let name = ["x", "y", "z"][axis];
+            warnings.push(format!("gravity along the periodic {name} axis: everything falls for ever; give it walls"));
+        }
+    }
+    warnings
+}
+
+/// Three digits with the unit.
+fn quantity(value: f64, unit: &str) -> String {
+    format!("{value:.3e} {unit}")
+}
