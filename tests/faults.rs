@@ -39,9 +39,11 @@ fn corrupt_truncated_and_foreign_checkpoints_are_refused() {
     let mut flipped = good.clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;
-    for (bytes, what) in
-        [(flipped, "damaged"), (good[..good.len() / 2].to_vec(), "truncated"), (b"not a checkpoint".to_vec(), "foreign")]
-    {
+    for (bytes, what) in [
+        (flipped, "damaged"),
+        (good[..good.len() / 2].to_vec(), "truncated"),
+        (b"not a checkpoint".to_vec(), "foreign"),
+    ] {
         fs::write(&file, bytes).expect("the build folder can be written");
         for ranks in [1, 2] {
             let output = restart(&file, ranks);
@@ -95,7 +97,7 @@ fn an_overlap_beyond_the_limit_stops_all_ranks_with_a_post_mortem() {
     let config = data("mixed_flow.toml");
     for ranks in [1, 3] {
         let directory = scratch("overlap");
-        let extra = ["--set", "max_overlap_fraction=0.001"];
+        let extra = ["--set", "contact.max_overlap_fraction=0.001"];
         let output = launch(&Run { config: &config, ranks, threads: 1 }, &directory, &extra);
         expect_failure(&output, 1, &["overlaps by", "max_overlap_fraction", "step"]);
         let names = fs::read_dir(&directory).into_iter().flatten().flatten();
