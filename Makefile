@@ -54,11 +54,9 @@ lint: setup
 	@for script in scripts/*.sh jobscripts/*.sh .ci/run; do bash -n "$$script"; done
 	@if command -v shellcheck >/dev/null; then shellcheck -x scripts/*.sh jobscripts/*.sh .ci/run; fi
 
+# BENCH="--particles 1000000 --layouts 2x1" narrows or widens it.
 bench: build
-	@$(ENVIRONMENT) for ranks in 1 2; do for threads in 1 2; do \
-	    echo; echo "ranks $$ranks, threads $$threads"; \
-	    run_ranks "$$ranks" "$(TARGET)/release/dem-mpi" bench --threads "$$threads"; \
-	done; done
+	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" bench $(BENCH)
 
 serial:
 	@scripts/setup.sh serial
