@@ -60,7 +60,8 @@ bench: build
 	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" bench $(BENCH)
 
 docs: build
-	@mkdir -p docs; "$(TARGET)/release/dem-mpi" reference >docs/input.md
+	@mkdir -p docs; { echo "# Input reference"; echo; echo "Written by \`make docs\` from the program's own tables."; echo; \
+	    "$(TARGET)/release/dem-mpi" reference; } >docs/input.md
 
 serial:
 	@scripts/setup.sh serial
