@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint bench build install serial static setup setup-test
+.PHONY: help demo test test-long lint bench build install docs serial static setup setup-test
 
 # Before each command: PATH, root and HDF5 as this machine needs them.
 ENVIRONMENT := . scripts/environment.sh; hdf5_dir=$$(parallel_hdf5_dir); \
@@ -21,6 +21,7 @@ help:
 	@echo "make bench      particle-steps/s on one and two ranks and threads"
 	@echo "make build      build the program"
 	@echo "make install    build and copy dem-mpi into cargo's bin folder"
+	@echo "make docs       write docs/input.md anew from the program"
 	@echo "make serial     build without MPI, into $(TARGET)/serial"
 	@echo "make static     build without MPI, HDF5 built along, into $(TARGET)/static (CMake 3.26 or newer)"
 
@@ -54,11 +55,13 @@ lint: setup
 	@for script in scripts/*.sh jobscripts/*.sh .ci/run; do bash -n "$$script"; done
 	@if command -v shellcheck >/dev/null; then shellcheck -x scripts/*.sh jobscripts/*.sh .ci/run; fi
 
+# BENCH="--particles 1000000 --layouts 2x1" narrows or widens it.
 bench: build
-	@$(ENVIRONMENT) for ranks in 1 2; do for threads in 1 2; do \
-	    echo; echo "ranks $$ranks, threads $$threads"; \
-	    run_ranks "$$ranks" "$(TARGET)/release/dem-mpi" bench --threads "$$threads"; \
-	done; done
+	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" bench $(BENCH)
+
+docs: build
+	@mkdir -p docs; { echo "# Input reference"; echo; echo "Written by \`make docs\` from the program's own tables."; echo; \
+	    "$(TARGET)/release/dem-mpi" reference; } >docs/input.md
 
 serial:
 	@scripts/setup.sh serial

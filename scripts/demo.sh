@@ -12,9 +12,9 @@ run_ranks 2 dem-mpi configs/quickstart.toml </dev/null
 
 echo
 echo "The run directory is $run:"
-for picture in "$run"/plots/*.png; do
-    [ -e "$picture" ] && echo "  picture    $picture"
-done
+if [ -e "$run/plots/stress_strain.png" ]; then
+    echo "  picture    $run/plots/stress_strain.png   (more beside it)"
+fi
 for series in "$run"/snapshots/*.series; do
     [ -e "$series" ] && echo "  ParaView   $series   (File > Open; README.md, \"Reading the output\")"
 done
