@@ -63,11 +63,12 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     let prepared = if active.rank() == 0 { prepare(config, checkpoint.as_deref()) } else { Ok(()) };
     agree(&active, prepared)?;
     let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
-    Run::new(simulation, Arc::clone(config))?.to_the_end()
+    Run::new(simulation, Arc::clone(config))?.drive()
 }
 
 /// Threads of this rank: as given, else the cores that this rank may use. Enters rayon's pool from the
 /// main thread, so that handing it work costs little.
+#[must_use]
 pub fn set_up_threads(comm: &Communicator, config: &Config) -> usize {
     let threads = config.parallel.threads.unwrap_or_else(|| automatic_threads(comm.size()));
     // A second call in one process (tests, verify) keeps the first pool.
@@ -137,7 +138,7 @@ impl Run {
         })
     }
 
-    fn to_the_end(mut self) -> Result<Outcome> {
+    fn drive(mut self) -> Result<Outcome> {
         while !self.simulation.settle_stage() {
             let wanted = self.wanted();
             let requests = self.requests();

@@ -80,7 +80,7 @@ fn section(text: &mut String, title: &str, path: &str, table: &Table) {
             Kind::List(table) if inner != "stage.part" => section(text, &format!("`[[{inner}]]`"), &inner, table),
             Kind::OneOf(table, _) => section(text, &format!("`[{inner}]`"), &inner, table),
             Kind::Law(role) if path == "contact" => {
-                laws(role).for_each(|(law, keys)| law_section(text, &inner, law, keys))
+                laws(role).for_each(|(law, keys)| law_section(text, &inner, law, keys));
             }
             _ => {}
         }

@@ -29,12 +29,11 @@ pub(super) fn read_cell(root: &Section, materials: &[String]) -> Option<CellConf
             faulty = true;
             return Boundary::Periodic;
         };
-        match super::particles::find_material(&section, "wall_material", name, materials) {
-            Some(material) => Boundary::Walls { material },
-            None => {
-                faulty = true;
-                Boundary::Periodic
-            }
+        if let Some(material) = super::particles::find_material(&section, "wall_material", name, materials) {
+            Boundary::Walls { material }
+        } else {
+            faulty = true;
+            Boundary::Periodic
         }
     });
     if section.given("wall_material") && !words.iter().flatten().any(|word| word == "walls") {

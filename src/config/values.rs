@@ -133,7 +133,7 @@ impl<'a> Section<'a> {
                 Some(nodes) => nodes.map(|item| self.word(item?, name, &key.kind, allowed)),
                 None => [const { None }; 3],
             },
-            (None, Default::Word(word)) => [const { () }; 3].map(|()| Some(word.to_owned())),
+            (None, Default::Word(word)) => [const {}; 3].map(|()| Some(word.to_owned())),
             _ => [const { None }; 3],
         };
         let mut table = toml::map::Map::new();
@@ -167,7 +167,7 @@ impl<'a> Section<'a> {
         let value = match node.value {
             Value::Integer(v) => u64::try_from(v).ok(),
             // 1e5 is a float to TOML and a count to people.
-            Value::Float(v) if v >= 0.0 && v <= 9e15 && libm::trunc(v) == v => Some(v as u64),
+            Value::Float(v) if (0.0..=9e15).contains(&v) && libm::trunc(v) == v => Some(v as u64),
             _ => None,
         };
         if value.is_none_or(|v| v < min) {
@@ -282,13 +282,14 @@ impl<'a> Section<'a> {
     pub fn interval(&self, name: &str) -> Option<Interval> {
         let (key, node) = self.lookup(name);
         let text = match (node, key.default) {
-            (Some(node), _) => match &node.value {
-                Value::Text(text) => text.clone(),
-                _ => {
+            (Some(node), _) => {
+                if let Value::Text(text) = &node.value {
+                    text.clone()
+                } else {
                     self.mismatch(node, name, &key.kind);
                     return None;
                 }
-            },
+            }
             (None, Default::Word(word)) => word.to_owned(),
             _ => return None,
         };

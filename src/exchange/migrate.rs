@@ -206,12 +206,11 @@ fn merge_rows(memory: &mut ContactMemory, arriving: &ContactMemory, step: u64) -
     let mut places: FxHashMap<ContactKey, usize> =
         memory.keys.iter().enumerate().map(|(index, key)| (*key, index)).collect();
     for (index, key) in arriving.keys.iter().enumerate() {
-        match places.get(key) {
-            Some(&place) => check_same(*key, memory.row(place), arriving.row(index), step)?,
-            None => {
-                places.insert(*key, memory.keys.len());
-                memory.push(*key, arriving.row(index));
-            }
+        if let Some(&place) = places.get(key) {
+            check_same(*key, memory.row(place), arriving.row(index), step)?
+        } else {
+            places.insert(*key, memory.keys.len());
+            memory.push(*key, arriving.row(index));
         }
     }
     Ok(())

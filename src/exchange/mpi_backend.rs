@@ -183,7 +183,7 @@ impl MpiBackend {
                         count(rank),
                         0,
                         self.group.as_raw(),
-                        &mut request,
+                        &raw mut request,
                     );
                     flight.requests.push(request);
                 }
@@ -201,7 +201,7 @@ impl MpiBackend {
                         count(rank),
                         0,
                         self.group.as_raw(),
-                        &mut request,
+                        &raw mut request,
                     );
                     flight.requests.push(request);
                 }

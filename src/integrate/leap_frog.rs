@@ -76,7 +76,7 @@ struct Slice<'a> {
     reference_shift: &'a mut [[i32; 3]],
 }
 
-impl<'a> Slice<'a> {
+impl Slice<'_> {
     fn split(self, middle: usize) -> (Self, Self) {
         let (record, record_high) = self.record.split_at_mut(middle);
         let (image, image_high) = self.image.split_at_mut(middle);

@@ -119,9 +119,10 @@ pub fn latest(comm: &Communicator, directory: &Path) -> Result<Latest> {
             Err(error) => warnings.push(format!("passed over: {error}")),
         }
     }
-    let reason = match warnings.is_empty() {
-        true => "no checkpoint-STEP.h5 in this folder; give the directory of a run that has written one".to_owned(),
-        false => format!("no checkpoint in this folder can be used: {}", warnings.join("; ")),
+    let reason = if warnings.is_empty() {
+        "no checkpoint-STEP.h5 in this folder; give the directory of a run that has written one".to_owned()
+    } else {
+        format!("no checkpoint in this folder can be used: {}", warnings.join("; "))
     };
     Err(fault(directory, reason))
 }

@@ -36,10 +36,12 @@ impl Scene {
     pub fn state(&self, id: u32, time: u64) -> ParticleState {
         let draw = |what: u64| random([u64::from(id), time, what]);
         let vector = |start: u64| [0, 1, 2].map(|k| draw(start + k) - 0.5);
-        let position = [0, 1, 2].map(|k| match self.periodic[k] {
-            true => draw(k as u64) * self.sides[k],
-            // Walls may be overlapped a little.
-            false => (draw(k as u64) * 1.1 - 0.05) * self.sides[k],
+        let position = [0, 1, 2].map(|k| {
+            if self.periodic[k] {
+                draw(k as u64) * self.sides[k]
+            } else {
+                (draw(k as u64) * 1.1 - 0.05) * self.sides[k]
+            }
         });
         ParticleState {
             id,

@@ -229,7 +229,7 @@ fn the_spring_relaxes_with_the_branches_of_the_normal_law() {
     let (mut memory, mut energies, mut work) = ([0.0; 10], Energies::zero(), 0.0);
     let mut force = 0.0;
     for k in 1..=steps {
-        let time = k as f64 * step;
+        let time = f64::from(k) * step;
         let speed = if time < push { 1e-6 * libm::sin(std::f64::consts::PI * time / push) } else { 0.0 };
         let touch = sliding(OVERLAP, speed);
         let response = law.evaluate(&touch, &normal(&touch), &mut memory);
