@@ -182,7 +182,7 @@ static FILE: Table = Table {
         Kind::Text,
         Required,
         "CSV or HDF5 file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
-         optionally vx_m/s, vy_m/s, vz_m/s, wx_rad/s, wy_rad/s, wz_rad/s.",
+         optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s.",
     )],
 };
 
