@@ -60,7 +60,8 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
     let initial = setup::onto_first(comm, ranks, initial)?;
     let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
-    let prepared = if active.rank() == 0 { prepare(config, checkpoint.as_deref()) } else { Ok(()) };
+    let prepared =
+        if active.rank() == 0 { prepare(config, checkpoint.as_deref(), initial.global.step) } else { Ok(()) };
     agree(&active, prepared)?;
     let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
     Run::new(simulation, Arc::clone(config))?.drive()
@@ -106,8 +107,8 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
     Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
 }
 
-fn prepare(config: &Config, checkpoint: Option<&Path>) -> Result<()> {
-    output::prepare_directory(config)?;
+fn prepare(config: &Config, checkpoint: Option<&Path>, step: u64) -> Result<()> {
+    output::prepare_directory(config, step)?;
     checkpoint.map_or(Ok(()), |file| output::take_over(config, file))
 }
 

@@ -207,7 +207,7 @@ fn merge_rows(memory: &mut ContactMemory, arriving: &ContactMemory, step: u64) -
         memory.keys.iter().enumerate().map(|(index, key)| (*key, index)).collect();
     for (index, key) in arriving.keys.iter().enumerate() {
         if let Some(&place) = places.get(key) {
-            check_same(*key, memory.row(place), arriving.row(index), step)?
+            check_same(*key, memory.row(place), arriving.row(index), step)?;
         } else {
             places.insert(*key, memory.keys.len());
             memory.push(*key, arriving.row(index));

@@ -4,6 +4,7 @@ use crate::config::{AxisControl, Config, Interval};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
 use crate::force::observe::Wanted;
+use crate::output::checkpoint;
 use crate::output::digest::Digest;
 use crate::output::history::HistoryWriter;
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
@@ -12,24 +13,29 @@ use crate::output::snapshot::{Moment, SnapshotSeries};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Steps between looks at the progress bar.
 const PROGRESS_STEPS: u64 = 256;
 
-/// Rank 0 makes the run directory with the resolved input.
+/// Rank 0 makes the run directory with the resolved input, and clears away what belongs to a future that
+/// is computed anew from `step`: later checkpoints, and the end of an earlier run.
 ///
 /// # Errors
 /// The directory cannot be made or written.
-pub fn prepare_directory(config: &Config) -> Result<()> {
+pub fn prepare_directory(config: &Config, step: u64) -> Result<()> {
     let directory = &config.output.directory;
     let failed = |attempt: &str, path: &Path, error: std::io::Error| Error::File {
         path: path.to_path_buf(),
         message: format!("cannot {attempt} ({error}); choose another output.directory or free the disk"),
     };
     fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, error))?;
+    checkpoint::discard_after(directory, step)?;
+    for path in ends_of_earlier_runs(directory) {
+        fs::remove_file(&path).map_err(|error| failed("remove the old file", &path, error))?;
+    }
     let path = directory.join("config.resolved.toml");
     fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, error))
 }
@@ -65,6 +71,13 @@ pub fn take_over(config: &Config, checkpoint: &Path) -> Result<()> {
         copied(&entry.path(), &to.join("snapshots").join(entry.file_name()))?;
     }
     Ok(())
+}
+
+/// Status file and post-mortem files in a run directory.
+fn ends_of_earlier_runs(directory: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let old = |name: &str| name == "status.toml" || name.starts_with("post_mortem-rank") && name.ends_with(".json");
+    entries.filter(|entry| entry.file_name().to_str().is_some_and(old)).map(|entry| entry.path()).collect()
 }
 
 /// Open output of a run on one rank.
