@@ -39,9 +39,11 @@ fn corrupt_truncated_and_foreign_checkpoints_are_refused() {
     let mut flipped = good.clone();
     let middle = flipped.len() / 2;
     flipped[middle] ^= 1;
-    for (bytes, what) in
-        [(flipped, "damaged"), (good[..good.len() / 2].to_vec(), "truncated"), (b"not a checkpoint".to_vec(), "foreign")]
-    {
+    for (bytes, what) in [
+        (flipped, "damaged"),
+        (good[..good.len() / 2].to_vec(), "truncated"),
+        (b"not a checkpoint".to_vec(), "foreign"),
+    ] {
         fs::write(&file, bytes).expect("the build folder can be written");
         for ranks in [1, 2] {
             let output = restart(&file, ranks);

@@ -34,7 +34,11 @@ fn stop_and_restart(signal: &str, to_rank: bool, codes: &[i32], ranks: usize) {
     assert!(Command::new("kill").args([signal, &target]).status().expect("kill starts").success());
     let output = wait(child);
     let code = output.status.code();
-    assert!(code.is_some_and(|code| codes.is_empty() && code != 0 || codes.contains(&code)), "{code:?}: {}", text(&output));
+    assert!(
+        code.is_some_and(|code| codes.is_empty() && code != 0 || codes.contains(&code)),
+        "{code:?}: {}",
+        text(&output)
+    );
     let restart = ["--restart", directory.to_str().expect("a UTF-8 path")];
     let again = launch(&Run { config: &config, ranks, threads: 1 }, &directory, &[&LONG[..], &restart].concat());
     assert!(again.status.success(), "{}", text(&again));

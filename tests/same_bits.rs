@@ -83,7 +83,8 @@ fn threads_that_share_the_work_give_the_same_bits() {
 fn two_spheres_in_a_cell_of_one_diameter_have_the_same_bits_over_ranks() {
     // Own images and several images of one partner (W Fig. 8), over subdomains thinner than a sphere.
     let config = common::root().join("configs/two_spheres.toml");
-    let extra = ["--set", "stage.0.duration=0.5 ms", "--set", "output.plots=false", "--set", "stage.0.strain_rate.z=40 1/s"];
+    let extra =
+        ["--set", "stage.0.duration=0.5 ms", "--set", "output.plots=false", "--set", "stage.0.strain_rate.z=40 1/s"];
     let reference = outcome("two", &Run { config: &config, ranks: 1, threads: 1 }, &extra);
     for grid in ["[1, 1, 2]", "[2, 1, 2]", "[1, 3, 1]"] {
         let grid = format!("parallel.grid={grid}");
