@@ -18,3 +18,4 @@ pub mod setup;
 pub mod simulation;
 pub mod state;
 pub mod units;
+pub mod verify;
