@@ -130,7 +130,11 @@ impl<'a> Section<'a> {
         let Kind::AxisWords(allowed) = key.kind else { panic!("`{name}` is not described as words per axis") };
         let words = match (node, key.default) {
             (Some(node), _) => match self.axis_nodes(node, name, &key, true) {
-                Some(nodes) => nodes.map(|item| self.word(item?, name, &key.kind, allowed)),
+                Some(nodes) => nodes.map(|item| match (item, key.default) {
+                    (Some(item), _) => self.word(item, name, &key.kind, allowed),
+                    (None, Default::Word(word)) => Some(word.to_owned()),
+                    _ => None,
+                }),
                 None => [const { None }; 3],
             },
             (None, Default::Word(word)) => [const {}; 3].map(|()| Some(word.to_owned())),

@@ -70,10 +70,8 @@ fn balance(row: &HistoryRow) -> f64 {
 struct GasRun {
     /// Largest change of momentum over the sum of magnitudes.
     momentum_drift: f64,
-    /// Change of the energy balance over the kinetic energy lost or held at the start.
+    /// Change of the energy balance over the initial kinetic energy.
     energy_error: f64,
-    /// Dissipated over initial kinetic energy.
-    dissipated: f64,
 }
 
 fn gas_run(time_step: f64, restitution: f64, friction: f64) -> Result<GasRun> {
@@ -91,22 +89,25 @@ fn gas_run(time_step: f64, restitution: f64, friction: f64) -> Result<GasRun> {
     let (after, _) = momentum(&states(&mut simulation)?);
     let momentum_drift = (0..3).map(|k| (after[k] - before[k]).abs()).fold(0.0, f64::max) / magnitude;
     let (first, last) = (&ends[0], &ends[ends.len() - 1]);
-    Ok(GasRun {
-        momentum_drift,
-        energy_error: (balance(last) - balance(first)) / first.kinetic,
-        dissipated: last.ledger[3..].iter().sum::<f64>() / first.kinetic,
-    })
+    Ok(GasRun { momentum_drift, energy_error: (balance(last) - balance(first)) / first.kinetic })
 }
 
-/// A periodic gas of frictional spheres over several collisions each.
+/// Time step of the gas \[s\]: a contact lasts some 900 of them.
+const STEP: f64 = 1e-7;
+
+/// A periodic gas over several collisions of each sphere.
 pub fn gas() -> Result<Vec<Claim>> {
     let mut claims = Vec::new();
     for (name, restitution, friction) in [("elastic", 1.0, 0.0), ("frictional", 1.0, 0.5), ("damped", 0.7, 0.5)] {
-        let coarse = gas_run(2e-7, restitution, friction)?;
-        let fine = gas_run(1e-7, restitution, friction)?;
-        eprintln!("{name} {} {} diss {}", coarse.energy_error, fine.energy_error, fine.dissipated);
+        let fine = gas_run(STEP, restitution, friction)?;
         claims.push(Claim::bounded(format!("{name}: relative drift of momentum"), 1e-12, fine.momentum_drift));
-        claims.push(Claim::bounded(format!("{name}: energy balance over kinetic energy"), 1e-3, fine.energy_error));
+        claims.push(Claim::bounded(format!("{name}: energy balance over kinetic energy"), 1e-4, fine.energy_error));
+        if friction == 0.0 {
+            // With friction the balance was seen to converge at first order only, so there the bound alone stands.
+            let coarse = gas_run(2.0 * STEP, restitution, friction)?;
+            let ratio = coarse.energy_error / fine.energy_error;
+            claims.push(Claim::relative(format!("{name}: error at twice the step over it"), 4.0, ratio, 0.05));
+        }
     }
     Ok(claims)
 }
