@@ -41,6 +41,8 @@ pub enum Outcome {
 /// # Errors
 /// Whatever went wrong, the same error on every rank that computes.
 pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> Result<Outcome> {
+    // First of all, and on idle ranks too: mpirun forwards signals to every rank, and an unheard one kills.
+    let signals = agree(comm, Signals::listen())?;
     let threads = set_up_threads(comm, config);
     let (initial, checkpoint) = match &options.restart {
         Some(path) => from_checkpoint(comm, config, path).map(|(initial, file)| (initial, Some(file)))?,
@@ -64,7 +66,7 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
         if active.rank() == 0 { prepare(config, checkpoint.as_deref(), initial.global.step) } else { Ok(()) };
     agree(&active, prepared)?;
     let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
-    Run::new(simulation, Arc::clone(config))?.drive()
+    Run::new(simulation, Arc::clone(config), signals)?.drive()
 }
 
 /// Threads of this rank: as given, else the cores that this rank may use. Enters rayon's pool from the
@@ -124,9 +126,8 @@ struct Run {
 }
 
 impl Run {
-    fn new(simulation: Simulation, config: Arc<Config>) -> Result<Self> {
+    fn new(simulation: Simulation, config: Arc<Config>, signals: Signals) -> Result<Self> {
         let output = RunOutput::new(&simulation, &config)?;
-        let signals = agree(simulation.comm(), Signals::listen())?;
         let first_step = simulation.global().step;
         Ok(Self {
             simulation,
