@@ -1,5 +1,6 @@
 //! The command line as typed, and what each subcommand calls.
 
+use crate::bench::{self, BenchOptions};
 use crate::config::{self, Config};
 use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
@@ -53,6 +54,17 @@ struct InputArguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Validate a configuration and print the pre-run sheet.
+    Check {
+        /// Configuration file (TOML).
+        config: PathBuf,
+        #[command(flatten)]
+        input: InputArguments,
+    },
+    /// Print a commented example configuration.
+    Init,
+    /// Print the input reference as Markdown.
+    Reference,
     /// Draw the plots of a run directory.
     Plot {
         /// Run directory.
@@ -63,6 +75,8 @@ enum Command {
         /// Run directory or checkpoint file.
         path: PathBuf,
     },
+    /// Measure speed: particle-steps/s on a jammed periodic packing.
+    Bench(BenchOptions),
 }
 
 impl InputArguments {
@@ -87,11 +101,23 @@ pub fn main() -> i32 {
         None => return parallel(|comm| run_command(comm, &arguments.run)),
     };
     let done = match command {
+        Command::Check { config, input } => {
+            input.load(&config).map(|config| print!("{}", config::sheet::sheet(&config)))
+        }
+        Command::Init => {
+            print!("{}", config::example());
+            Ok(())
+        }
+        Command::Reference => {
+            print!("{}", config::reference_markdown());
+            Ok(())
+        }
         Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
             for file in files {
                 println!("{}", file.display());
             }
         }),
+        Command::Bench(options) => bench::main(&options),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
     };
     match done {

@@ -1,6 +1,7 @@
 //! dem-mpi: the discrete element method for battery electrodes and granular matter, parallel over
 //! MPI ranks and threads, with the same bits on every machine shape. See `ARCHITECTURE.md`.
 
+pub mod bench;
 pub mod cli;
 pub mod config;
 pub mod contact;

@@ -11,6 +11,7 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
+pub use output::resident_bytes;
 use output::{RunOutput, is_due};
 use signals::Signals;
 use std::path::{Path, PathBuf};
@@ -41,9 +42,9 @@ pub enum Outcome {
 /// Whatever went wrong, the same error on every rank that computes.
 pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> Result<Outcome> {
     let threads = set_up_threads(comm, config);
-    let initial = match &options.restart {
-        Some(path) => from_checkpoint(comm, config, path)?,
-        None => setup::from_packing(comm, config)?,
+    let (initial, checkpoint) = match &options.restart {
+        Some(path) => from_checkpoint(comm, config, path).map(|(initial, file)| (initial, Some(file)))?,
+        None => (setup::from_packing(comm, config)?, None),
     };
     let decomposition = agree(comm, setup::decomposition(comm, config, &initial.global))?;
     let ranks = decomposition.ranks();
@@ -59,7 +60,7 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
     let initial = setup::onto_first(comm, ranks, initial)?;
     let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
-    let prepared = if active.rank() == 0 { output::prepare_directory(config) } else { Ok(()) };
+    let prepared = if active.rank() == 0 { prepare(config, checkpoint.as_deref()) } else { Ok(()) };
     agree(&active, prepared)?;
     let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
     Run::new(simulation, Arc::clone(config))?.to_the_end()
@@ -83,7 +84,7 @@ fn automatic_threads(ranks: usize) -> usize {
     (cores / local.max(1)).max(1)
 }
 
-fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<Initial> {
+fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<(Initial, PathBuf)> {
     let mut file = path.to_path_buf();
     if path.is_dir() {
         let latest = checkpoint::latest(comm, path)?;
@@ -101,7 +102,12 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
             read.global.time
         );
     }
-    agree(comm, setup::from_checkpoint(config, read))
+    Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
+}
+
+fn prepare(config: &Config, checkpoint: Option<&Path>) -> Result<()> {
+    output::prepare_directory(config)?;
+    checkpoint.map_or(Ok(()), |file| output::take_over(config, file))
 }
 
 /// A run in progress on one rank.

@@ -3,7 +3,7 @@
 use crate::config::{Boundary, Config, Motion, ParallelConfig, TimeStepConfig};
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
-use crate::exchange::{Communicator, Decomposition, ExactSum, agree, distribute, exact_sum};
+use crate::exchange::{Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum};
 use crate::force::pass;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
@@ -241,15 +241,16 @@ pub fn simulation(
     if initial.memory.keys.is_empty() {
         initial.memory = ContactMemory::new(model.lists.memory_width());
     }
-    let (particles, memory) = distribute(
-        &comm,
-        &decomposition,
-        initial.particles,
-        initial.memory,
-        initial.global.sides,
-        initial.global.particles,
-    )?;
-    Simulation::new(comm, model, decomposition, initial.global, &particles, memory, threads)
+    let setting = MigrationSetting {
+        decomposition: &decomposition,
+        species: &model.species,
+        sides: initial.global.sides,
+        time_step: initial.global.previous_time_step,
+        particles_total: initial.global.particles,
+        step: initial.global.step,
+    };
+    let (particles, memory) = distribute(&comm, &setting, &initial.particles, &initial.memory)?;
+    Simulation::new(comm, model, decomposition, initial.global, particles, memory, threads)
 }
 
 /// Give what ranks beyond the first `ranks` hold to the ranks that compute.

@@ -9,63 +9,39 @@ use std::fs;
 
 /// The modules in the order of the data's way through a run, each with what it may import. A name stands
 /// for a whole module and must be listed above; `module::part` opens one part of a module that comes later.
+#[rustfmt::skip]
 const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("units", &["error"]),
-    ("random", &["error"]),
-    ("exact_sum", &["error"]),
     // The catalogue of laws says which sections of the input exist.
-    ("config", &["error", "units", "force::registry"]),
+    ("config", &["error", "units", "force::registry", "force::documentation"]),
     ("state", &["error", "config"]),
-    ("exchange", &["error", "config", "state", "exact_sum"]),
-    ("packing", &["error", "config", "state", "exchange", "random"]),
-    ("neighbour", &["error", "config", "state"]),
-    // The list that holds the memory of contacts, and the geometry of one touch in lanes.
-    ("contact", &["error", "config", "state", "neighbour", "force::lane", "force::law"]),
-    ("force", &["error", "config", "state", "contact"]),
-    ("gather", &["error", "config", "state", "contact", "force"]),
-    ("integrate", &["error", "config", "state", "random"]),
+    ("exchange", &["error", "config", "state"]),
+    ("packing", &["error", "config", "state", "exchange"]),
+    ("neighbour", &["error", "config", "state", "contact::shift"]),
+    ("contact", &["error", "config", "state", "neighbour"]),
+    // Sums over contacts go into the exact accumulator, which knows nothing of ranks.
+    ("force", &["error", "config", "state", "contact", "exchange::exact_sum"]),
+    ("integrate", &["error", "config", "state", "contact", "force"]),
     ("load", &["error", "config", "state"]),
-    ("homogenise", &["error", "config", "state", "exact_sum", "exchange", "contact", "force"]),
-    ("output", &["error", "config", "units", "state", "exchange", "force", "homogenise"]),
+    ("homogenise", &["error", "config", "state", "exchange", "contact", "force"]),
+    ("output", &["error", "config", "units", "state", "exchange", "force::law", "homogenise"]),
     ("plot", &["error", "config", "output"]),
-    (
-        "setup",
-        &[
-            "error",
-            "config",
-            "state",
-            "random",
-            "exchange",
-            "packing",
-            "neighbour",
-            "contact",
-            "force",
-            "load",
-            "output",
-        ],
-    ),
     (
         "simulation",
         &[
-            "error",
-            "config",
-            "state",
-            "exact_sum",
-            "exchange",
-            "neighbour",
-            "contact",
-            "force",
-            "gather",
-            "integrate",
-            "load",
-            "homogenise",
+            "error", "config", "state", "exchange", "neighbour", "contact", "force", "integrate", "load", "homogenise",
             "output",
-            "plot",
-            "setup",
         ],
     ),
-    ("routine", &["error", "config", "state", "exchange", "load", "homogenise", "output", "setup", "simulation"]),
+    (
+        "setup",
+        &[
+            "error", "config", "state", "exchange", "packing", "contact", "force", "integrate", "load", "output",
+            "simulation",
+        ],
+    ),
+    ("run", &["error", "config", "state", "exchange", "force", "output", "plot", "setup", "simulation"]),
     ("verify", &["*"]),
     ("bench", &["*"]),
     ("cli", &["*"]),
@@ -73,14 +49,13 @@ const LAYERS: &[(&str, &[&str])] = &[
 
 /// Files that may hold unsafe code, with the reason.
 const UNSAFE_FILES: &[(&str, &str)] = &[
-    ("src/exchange/mpi.rs", "MPI's own handles and byte buffers"),
-    ("src/output/hdf5_file.rs", "collective transfer through the HDF5 C interface; reserving disk space"),
-    ("src/force/simd.rs", "SIMD lanes"),
-    ("src/force/pass.rs", "each thread writes its own lines of one output array"),
+    ("src/exchange/mpi_backend.rs", "MPI's own handles and calls that the safe layer lacks"),
+    ("src/output/hdf5_file/reader.rs", "collective reads through the HDF5 C interface"),
+    ("src/output/hdf5_file/writer.rs", "collective writes through the HDF5 C interface; reserving disk space"),
 ];
 
-/// The file that speaks to the HDF5 C interface.
-const HDF5_FILE: &str = "src/output/hdf5_file.rs";
+/// The module that speaks to the HDF5 C interface.
+const HDF5_MODULE: &str = "src/output/hdf5_file";
 
 /// Longest file in lines.
 const MAX_LINES: usize = 500;
@@ -121,7 +96,8 @@ fn the_table_of_layers_runs_one_way() {
 #[test]
 fn imports_run_one_way() {
     let mut problems = Vec::new();
-    for source in rust_files(&["src"]) {
+    // Files of tests may compare with whatever they like.
+    for source in rust_files(&["src"]).iter().filter(|source| !source.file_name().starts_with("test")) {
         let module = source.module();
         let Some(own) = module.first().copied() else { continue };
         let Some(index) = layer(own) else {
@@ -158,11 +134,11 @@ fn mpi_is_named_in_one_file_of_exchange() {
 }
 
 #[test]
-fn the_hdf5_c_interface_is_called_in_one_file() {
+fn the_hdf5_c_interface_is_called_in_one_module() {
     let mut problems = Vec::new();
-    for source in rust_files(&["src"]).iter().filter(|source| source.path != HDF5_FILE) {
+    for source in rust_files(&["src"]).iter().filter(|source| !source.path.starts_with(HDF5_MODULE)) {
         for line in lines_naming(source, "hdf5_sys") {
-            problems.push(format!("{}:{line}: HDF5 C calls belong in {HDF5_FILE}", source.path));
+            problems.push(format!("{}:{line}: HDF5 C calls belong in {HDF5_MODULE}", source.path));
         }
     }
     report(&problems);

@@ -163,7 +163,7 @@ static RANDOM_CLOSE: Table = Table {
         key(
             "contraction_rate",
             number(Dimension::NONE, Range::between(0.0, 1.0)),
-            Default::Number(0.001),
+            Default::Number(5e-4),
             "How fast the outer diameter contracts; smaller is denser and slower.",
         ),
         key(
@@ -360,7 +360,7 @@ pub static PARALLEL: Table = Table {
         key(
             "min_particles_per_rank",
             Kind::Integer(1),
-            Default::Integer(100),
+            Default::Integer(1000),
             "The automatic grid gives no rank fewer.",
         ),
     ],

@@ -19,15 +19,18 @@ impl Decomposition {
         let sensible = particles / (min_particles_per_rank.max(1) as u64);
         let used = ranks.min(usize::try_from(sensible).unwrap_or(usize::MAX)).max(1);
         let area = [sides[1] * sides[2], sides[2] * sides[0], sides[0] * sides[1]];
-        let mut best = ([1, 1, used], f64::INFINITY);
+        let mut best = ([1, 1, used], f64::INFINITY, 0.0);
         for x in divisors(used) {
             for y in divisors(used / x) {
                 let grid = [x, y, used / x / y];
                 // An axis of one rank is not cut; n ranks on it share n planes.
                 let planes = grid.map(|n| if n > 1 { n as f64 } else { 0.0 });
                 let surface = planes[0] * area[0] + planes[1] * area[1] + planes[2] * area[2];
-                if surface < best.1 {
-                    best = (grid, surface);
+                // Of equal surfaces, the thickest boxes: they need the fewest hops.
+                let thickness = (0..3).map(|k| sides[k] / grid[k] as f64).fold(f64::INFINITY, f64::min);
+                let same = surface <= best.1 * (1.0 + 1e-12);
+                if surface < best.1 * (1.0 - 1e-12) || same && thickness > best.2 {
+                    best = (grid, surface, thickness);
                 }
             }
         }

@@ -1,114 +1,80 @@
-//! Ghosts: copies of the remote particles that owned ones may touch, one per particle at its wrapped
-//! position, however many of its images matter (image shifts live in the contacts).
+//! The halo: copies ("ghosts") of the particles of other ranks that may touch a particle of this one.
+//! Built at a list rebuild, then refreshed every step with packed, direct, non-blocking messages.
 //!
-//! The plan is made when the lists are; between, each step sends positions, image counters and
-//! velocities straight to every rank that needs them, however many subdomains away it is.
+//! A ghost is a distinct remote particle at its wrapped position: one ghost per remote particle, however
+//! many of its periodic images matter. Image shifts belong to contacts. Own particles are never ghosts.
 
-use super::{Communicator, Decomposition};
-use crate::error::Result;
+use super::halo_map::HaloMap;
+use super::{Communicator, Decomposition, agree};
+use crate::error::{Error, Result};
 use crate::state::particles::{Particles, Record};
+use bytemuck::{Pod, Zeroable};
 
-/// Words per ghost and step: position, image counter, velocity, spin.
-const MOVING_WORDS: usize = 10;
-/// Words per ghost when the plan is made: identity, image, the whole record.
-const STATIC_WORDS: usize = 15;
-/// Bits per axis of the image counter in the message of a step.
-const IMAGE_BITS: u32 = 21;
-
-/// What goes to one rank.
-#[derive(Debug)]
-struct Send {
-    rank: usize,
-    particles: Vec<u32>,
-    buffer: Vec<u64>,
+/// What an update carries beside positions and image counters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HaloContent {
+    /// Full-step velocities and spins, for laws that damp or rub.
+    pub velocities: bool,
 }
 
-/// What comes from one rank: ghosts `first ..`.
-#[derive(Debug)]
-struct Receive {
-    rank: usize,
-    first: usize,
-    buffer: Vec<u64>,
+impl HaloContent {
+    /// 64-bit words per particle: position, image counters and, if asked, velocity and spin.
+    fn words(self) -> usize {
+        if self.velocities { 11 } else { 5 }
+    }
 }
 
-/// Who sends which particles to whom.
+/// What a ghost is when it appears.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Arrival {
+    record: Record,
+    id: u32,
+    species: u32,
+    image: [i32; 3],
+    /// Keeps the layout free of hidden padding.
+    reserved: i32,
+}
+
+/// Messages to or from one rank: a run of entries of the packed buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Message {
+    rank: usize,
+    entries: usize,
+}
+
+/// Who sends what to whom until the next rebuild.
+///
+/// The owned particles must keep their places as long as the plan is used.
 #[derive(Debug, Default)]
 pub struct HaloPlan {
-    sends: Vec<Send>,
-    receives: Vec<Receive>,
-}
-
-/// Ranks that may exchange ghosts, and the columns of the grid that a particle is needed in.
-struct Neighbourhood<'a> {
-    decomposition: &'a Decomposition,
-    sides: [f64; 3],
-    periodic: [bool; 3],
-    rank: usize,
-}
-
-impl Neighbourhood<'_> {
-    /// Columns along an axis whose interval, grown by `margin`, holds some image of `x`.
-    fn columns(&self, axis: usize, x: f64, margin: f64) -> Vec<usize> {
-        let count = self.decomposition.grid[axis] as i64;
-        let width = self.sides[axis] / count as f64;
-        // A hair wider, so that rounding never costs a ghost.
-        let margin = margin * (1.0 + 1e-9);
-        let (first, last) = (((x - margin) / width).floor() as i64, ((x + margin) / width).floor() as i64);
-        if last - first + 1 >= count {
-            return (0..count as usize).collect();
-        }
-        if self.periodic[axis] {
-            (first..=last).map(|column| column.rem_euclid(count) as usize).collect()
-        } else {
-            (first.max(0)..=last.min(count - 1)).map(|column| column as usize).collect()
-        }
-    }
-
-    /// The other ranks of the product of columns, ascending.
-    fn ranks(&self, columns: [Vec<usize>; 3]) -> Vec<usize> {
-        let mut ranks = Vec::new();
-        for x in &columns[0] {
-            for y in &columns[1] {
-                for z in &columns[2] {
-                    let rank = self.decomposition.rank([*x, *y, *z]);
-                    if rank != self.rank {
-                        ranks.push(rank);
-                    }
-                }
-            }
-        }
-        ranks.sort_unstable();
-        ranks
-    }
-
-    /// All ranks that may need particles of this one. The relation is symmetric, so that both sides know
-    /// without asking that a message comes.
-    fn partners(&self, largest_margin: f64) -> Vec<usize> {
-        let here = self.decomposition.coordinates(self.rank);
-        self.ranks([0, 1, 2].map(|axis| {
-            let count = self.decomposition.grid[axis] as i64;
-            let width = self.sides[axis] / count as f64;
-            let hops = (largest_margin * (1.0 + 1e-9) / width).floor() as i64 + 1;
-            if 2 * hops + 1 >= count {
-                return (0..count as usize).collect();
-            }
-            let around = here[axis] as i64 - hops..=here[axis] as i64 + hops;
-            if self.periodic[axis] {
-                around.map(|column| column.rem_euclid(count) as usize).collect()
-            } else {
-                around.filter(|c| (0..count).contains(c)).map(|c| c as usize).collect()
-            }
-        }))
-    }
+    /// In order of ranks; `send_index` holds the local indices in the same order.
+    sends: Vec<Message>,
+    send_index: Vec<u32>,
+    /// In order of ranks; ghosts follow in the same order after the owned particles.
+    receives: Vec<Message>,
+    border: Vec<u32>,
+    inner: Vec<u32>,
+    is_border: Vec<bool>,
+    owned: usize,
+    ghosts: usize,
+    outgoing: Vec<u64>,
+    incoming: Vec<u64>,
 }
 
 impl HaloPlan {
-    /// Find out who needs which owned particle, and append the ghosts behind the owned particles, in
-    /// order of the sending rank. `reach` is the largest radius plus the skin \[m\]: a particle is needed
-    /// where some image of it lies within its own radius plus `reach` of a subdomain.
+    /// Work out who needs which particle and exchange the ghosts. Collective.
+    ///
+    /// On entry `particles` holds owned particles only, each inside this rank's box (right after
+    /// [`super::migrate`]); the ghosts are appended, in order of sender rank. A rank receives each remote
+    /// particle of which some periodic image lies in its box grown by the particle's radius plus `reach`
+    /// (largest radius plus skin \[m\]), which may be many boxes or several cells away.
+    ///
+    /// Who sends to whom follows from the grid: partners tell each other a number of particles, possibly
+    /// zero, in one direct message; nothing grows with the number of all ranks.
     ///
     /// # Errors
-    /// None of its own; collective.
+    /// [`Error::Layout`], on all ranks, if a particle is not in its rank's box or larger than `reach`.
     pub fn build(
         comm: &Communicator,
         decomposition: &Decomposition,
@@ -117,156 +83,217 @@ impl HaloPlan {
         periodic: [bool; 3],
         reach: f64,
     ) -> Result<Self> {
-        let mut plan = Self::default();
-        if comm.size() == 1 {
-            return Ok(plan);
+        let owned = particles.owned;
+        let map = HaloMap::new(decomposition, comm.rank(), sides, periodic, reach);
+        agree(comm, check(comm.rank(), &map, particles, reach))?;
+
+        let mut lists = vec![Vec::new(); map.partners().len()];
+        let mut is_border = vec![false; owned];
+        for (index, record) in particles.record[..owned].iter().enumerate() {
+            map.for_each_needing(record.position, record.radius + reach, |partner| {
+                lists[partner].push(index as u32);
+                is_border[index] = true;
+            });
         }
-        let around = Neighbourhood { decomposition, sides, periodic, rank: comm.rank() };
-        let partners = around.partners(2.0 * reach);
-        let mut lists = vec![Vec::new(); partners.len()];
-        for (index, record) in particles.record.iter().enumerate() {
-            let margin = record.radius + reach;
-            let columns = [0, 1, 2].map(|axis| around.columns(axis, record.position[axis], margin));
-            if columns.iter().all(|c| c.len() == 1) && around.ranks(columns.clone()).is_empty() {
-                continue;
-            }
-            for rank in around.ranks(columns) {
-                if let Ok(partner) = partners.binary_search(&rank) {
-                    lists[partner].push(index as u32);
-                }
-            }
-        }
-        plan.exchange_static(comm, particles, &partners, lists);
+        let (border, inner) = (0..owned as u32).partition(|&index| is_border[index as usize]);
+
+        let own: Vec<u64> = lists.iter().map(|list| list.len() as u64).collect();
+        let mut theirs = vec![0_u64; own.len()];
+        comm.exchange_each(
+            map.partners().iter().zip(&own).map(|(&rank, number)| (rank, bytemuck::bytes_of(number))),
+            map.partners().iter().zip(&mut theirs).map(|(&rank, number)| (rank, bytemuck::bytes_of_mut(number))),
+            || (),
+        );
+        let sends = messages(map.partners(), &own);
+        let receives = messages(map.partners(), &theirs);
+        let ghosts = theirs.iter().sum::<u64>() as usize;
+        let mut plan = Self {
+            sends,
+            send_index: lists.concat(),
+            receives,
+            border,
+            inner,
+            is_border,
+            owned,
+            ghosts,
+            outgoing: Vec::new(),
+            incoming: Vec::new(),
+        };
+        plan.bring_ghosts(comm, particles);
         Ok(plan)
     }
 
-    fn exchange_static(
-        &mut self,
-        comm: &Communicator,
-        particles: &mut Particles,
-        partners: &[usize],
-        lists: Vec<Vec<u32>>,
-    ) {
-        let counts: Vec<u64> = lists.iter().map(|list| list.len() as u64).collect();
-        let mut incoming = vec![0_u64; partners.len()];
-        comm.exchange_each(
-            partners.iter().zip(&counts).map(|(rank, count)| (*rank, bytemuck::bytes_of(count))),
-            partners.iter().zip(&mut incoming).map(|(rank, count)| (*rank, bytemuck::bytes_of_mut(count))),
-            || (),
-        );
-        let mut outgoing: Vec<(usize, Vec<u64>)> = Vec::new();
-        for (rank, list) in partners.iter().zip(lists).filter(|(_, list)| !list.is_empty()) {
-            outgoing.push((*rank, list.iter().flat_map(|index| static_words(particles, *index as usize)).collect()));
-            let words = list.len() * MOVING_WORDS;
-            self.sends.push(Send { rank: *rank, particles: list, buffer: vec![0; words] });
-        }
-        let mut arriving: Vec<(usize, Vec<u64>)> = partners
+    fn bring_ghosts(&mut self, comm: &Communicator, particles: &mut Particles) {
+        let leaving: Vec<Arrival> = self
+            .send_index
             .iter()
-            .zip(&incoming)
-            .filter(|(_, count)| **count > 0)
-            .map(|(rank, count)| (*rank, vec![0_u64; *count as usize * STATIC_WORDS]))
+            .map(|&index| {
+                let index = index as usize;
+                Arrival {
+                    record: particles.record[index],
+                    id: particles.id[index],
+                    species: particles.species[index],
+                    image: particles.image[index],
+                    reserved: 0,
+                }
+            })
             .collect();
-        comm.exchange_each(
-            outgoing.iter().map(|(rank, words)| (*rank, bytemuck::cast_slice(words))),
-            arriving.iter_mut().map(|(rank, words)| (*rank, bytemuck::cast_slice_mut(words))),
-            || (),
-        );
-        for (rank, words) in arriving {
-            let count = words.len() / STATIC_WORDS;
-            self.receives.push(Receive { rank, first: particles.len(), buffer: vec![0; count * MOVING_WORDS] });
-            for ghost in words.chunks_exact(STATIC_WORDS) {
-                append_ghost(particles, ghost);
-            }
+        let mut arriving = vec![Arrival::zeroed(); self.ghosts];
+        comm.exchange_each(outgoing(&self.sends, &leaving, 1), incoming(&self.receives, &mut arriving, 1), || ());
+        for ghost in &arriving {
+            particles.id.push(ghost.id);
+            particles.species.push(ghost.species);
+            particles.record.push(ghost.record);
+            particles.image.push(ghost.image);
         }
     }
 
-    /// Send the present state of the border particles and receive that of the ghosts; `meanwhile` runs
-    /// while the messages fly. `wrapped` gets the ghosts whose image counter changed, with the change.
+    /// Refresh the ghosts; `meanwhile` runs on the particles while the messages fly (it sees the ghosts as
+    /// they were). All ranks call it, with the same content.
+    ///
+    /// Position and image counters always come, full-step velocity and spin if asked; what is not asked
+    /// keeps its old value. `wrapped` is replaced by the ghosts that crossed a periodic face since the last
+    /// update: local index and the change of the image counters.
     pub fn update<R>(
         &mut self,
         comm: &Communicator,
         particles: &mut Particles,
+        content: HaloContent,
         wrapped: &mut Vec<(u32, [i32; 3])>,
         meanwhile: impl FnOnce(&Particles) -> R,
     ) -> R {
-        for send in &mut self.sends {
-            for (index, words) in send.particles.iter().zip(send.buffer.chunks_exact_mut(MOVING_WORDS)) {
-                let record = &particles.record[*index as usize];
-                words[..3].copy_from_slice(&record.position.map(f64::to_bits));
-                words[3] = pack_image(particles.image[*index as usize]);
-                words[4..7].copy_from_slice(&record.velocity.map(f64::to_bits));
-                words[7..10].copy_from_slice(&record.spin.map(f64::to_bits));
-            }
+        let words = content.words();
+        self.outgoing.resize(self.send_index.len() * words, 0);
+        self.incoming.resize(self.ghosts * words, 0);
+        for (&index, entry) in self.send_index.iter().zip(self.outgoing.chunks_exact_mut(words)) {
+            pack(&particles.record[index as usize], particles.image[index as usize], entry);
         }
-        let result = if self.sends.is_empty() && self.receives.is_empty() {
-            meanwhile(particles)
-        } else {
-            comm.exchange_each(
-                self.sends.iter().map(|send| (send.rank, bytemuck::cast_slice(&send.buffer))),
-                self.receives.iter_mut().map(|receive| (receive.rank, bytemuck::cast_slice_mut(&mut receive.buffer))),
-                || meanwhile(particles),
-            )
-        };
-        for receive in &self.receives {
-            for (offset, words) in receive.buffer.chunks_exact(MOVING_WORDS).enumerate() {
-                let ghost = receive.first + offset;
-                let three = |from: usize| [0, 1, 2].map(|k| f64::from_bits(words[from + k]));
-                let record = &mut particles.record[ghost];
-                record.position = three(0);
-                record.velocity = three(4);
-                record.spin = three(7);
-                let change = image_change(particles.image[ghost], words[3]);
-                if change != [0; 3] {
-                    for k in 0..3 {
-                        particles.image[ghost][k] += change[k];
-                    }
-                    wrapped.push((ghost as u32, change));
-                }
+        let result = comm.exchange_each(
+            outgoing(&self.sends, &self.outgoing, words),
+            incoming(&self.receives, &mut self.incoming, words),
+            || meanwhile(particles),
+        );
+        wrapped.clear();
+        for (ghost, entry) in (self.owned..).zip(self.incoming.chunks_exact(words)) {
+            let image = unpack(entry, &mut particles.record[ghost]);
+            let old = std::mem::replace(&mut particles.image[ghost], image);
+            if image != old {
+                wrapped.push((ghost as u32, [0, 1, 2].map(|k| image[k] - old[k])));
             }
         }
         result
     }
 
-    /// Messages sent and bytes sent per step by this rank.
+    /// Whether owned particle `index` is a ghost somewhere. Only such particles can touch ghosts, so that
+    /// the others may move before the ghosts are there.
     #[must_use]
-    pub fn traffic(&self) -> (usize, usize) {
-        (self.sends.len(), self.sends.iter().map(|send| send.buffer.len() * size_of::<u64>()).sum())
+    pub fn is_border(&self, index: usize) -> bool {
+        self.is_border[index]
+    }
+
+    /// Owned particles that are ghosts somewhere, ascending.
+    #[must_use]
+    pub fn border(&self) -> &[u32] {
+        &self.border
+    }
+
+    /// Owned particles that no other rank sees, ascending.
+    #[must_use]
+    pub fn inner(&self) -> &[u32] {
+        &self.inner
+    }
+
+    /// Number of ghosts on this rank.
+    #[must_use]
+    pub fn ghosts(&self) -> usize {
+        self.ghosts
+    }
+
+    /// Messages that this rank sends per update.
+    #[must_use]
+    pub fn messages(&self) -> usize {
+        self.sends.len()
+    }
+
+    /// Bytes that this rank sends per update.
+    #[must_use]
+    pub fn bytes(&self, content: HaloContent) -> usize {
+        self.send_index.len() * content.words() * size_of::<u64>()
     }
 }
 
-/// The low bits of the image counters: enough to know by how much they changed since the last step.
-fn pack_image(image: [i32; 3]) -> u64 {
-    let mask = (1_u64 << IMAGE_BITS) - 1;
-    image.iter().rev().fold(0, |word, count| word << IMAGE_BITS | (*count as u64 & mask))
+fn check(rank: usize, map: &HaloMap, particles: &Particles, reach: f64) -> Result<()> {
+    for (record, id) in particles.record[..particles.owned].iter().zip(&particles.id) {
+        if !map.owns(record.position) {
+            return Err(Error::Layout(format!(
+                "rank {rank}: particle {id} at {:?} m is outside this rank's box while the halo is built; particles \
+                 migrate first, so this is an error of the program: report it",
+                record.position
+            )));
+        }
+        if record.radius > reach {
+            return Err(Error::Layout(format!(
+                "rank {rank}: particle {id} with radius {:e} m exceeds the halo's reach {reach:e} m; the reach is the \
+                 largest radius plus the skin, so this is an error of the program: report it",
+                record.radius
+            )));
+        }
+    }
+    Ok(())
 }
 
-fn image_change(known: [i32; 3], word: u64) -> [i32; 3] {
-    let mask = (1_u64 << IMAGE_BITS) - 1;
-    [0, 1, 2].map(|k| {
-        let now = word >> (IMAGE_BITS * k as u32) & mask;
-        let change = now.wrapping_sub(known[k] as u64) & mask;
-        // Sign of a two's complement number of so many bits.
-        if change >> (IMAGE_BITS - 1) == 1 { (change as i64 - (1_i64 << IMAGE_BITS)) as i32 } else { change as i32 }
+/// The partners with a message that is not empty.
+fn messages(partners: &[usize], numbers: &[u64]) -> Vec<Message> {
+    let all = partners.iter().zip(numbers).map(|(&rank, &entries)| Message { rank, entries: entries as usize });
+    all.filter(|message| message.entries > 0).collect()
+}
+
+/// Cut a packed buffer, `words` items per entry, into the messages to send.
+fn outgoing<'a, T: Pod>(
+    messages: &'a [Message],
+    buffer: &'a [T],
+    words: usize,
+) -> impl Iterator<Item = (usize, &'a [u8])> {
+    messages.iter().scan(buffer, move |rest, message| {
+        let (part, next) = rest.split_at(message.entries * words);
+        *rest = next;
+        Some((message.rank, bytemuck::cast_slice(part)))
     })
 }
 
-fn static_words(particles: &Particles, index: usize) -> [u64; STATIC_WORDS] {
-    let mut words = [0; STATIC_WORDS];
-    let [x, y, z] = particles.image[index].map(|count| u64::from(count as u32));
-    words[0] = u64::from(particles.id[index]) << 32 | u64::from(particles.species[index]);
-    words[1] = x << 32 | y;
-    words[2] = z;
-    words[3..].copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(&particles.record[index])));
-    words
+/// Cut a packed buffer into the places of the messages to come.
+fn incoming<'a, T: Pod>(
+    messages: &'a [Message],
+    buffer: &'a mut [T],
+    words: usize,
+) -> impl Iterator<Item = (usize, &'a mut [u8])> {
+    messages.iter().scan(buffer, move |rest, message| {
+        let (part, next) = std::mem::take(rest).split_at_mut(message.entries * words);
+        *rest = next;
+        Some((message.rank, bytemuck::cast_slice_mut(part)))
+    })
 }
 
-fn append_ghost(particles: &mut Particles, words: &[u64]) {
-    particles.id.push((words[0] >> 32) as u32);
-    particles.species.push(words[0] as u32);
-    particles.image.push([(words[1] >> 32) as i32, words[1] as i32, words[2] as i32]);
-    let mut record: Record = bytemuck::Zeroable::zeroed();
-    bytemuck::bytes_of_mut(&mut record).copy_from_slice(bytemuck::cast_slice(&words[3..]));
-    particles.record.push(record);
+/// One entry of an update; its length tells whether velocities travel.
+fn pack(record: &Record, image: [i32; 3], entry: &mut [u64]) {
+    entry[..3].copy_from_slice(&record.position.map(f64::to_bits));
+    entry[3] = u64::from(image[0] as u32) << 32 | u64::from(image[1] as u32);
+    entry[4] = u64::from(image[2] as u32);
+    if entry.len() > 5 {
+        entry[5..8].copy_from_slice(&record.velocity.map(f64::to_bits));
+        entry[8..].copy_from_slice(&record.spin.map(f64::to_bits));
+    }
+}
+
+/// The reverse of [`pack`]; returns the image counters.
+fn unpack(entry: &[u64], record: &mut Record) -> [i32; 3] {
+    let vector = |start: usize| [0, 1, 2].map(|k| f64::from_bits(entry[start + k]));
+    record.position = vector(0);
+    if entry.len() > 5 {
+        record.velocity = vector(5);
+        record.spin = vector(8);
+    }
+    [(entry[3] >> 32) as i32, entry[3] as i32, entry[4] as i32]
 }
 
 #[cfg(test)]
@@ -274,34 +301,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn image_changes_survive_the_packing_in_both_directions() {
-        for known in [[0, 0, 0], [-5, 7, 1 << 20], [1 << 25, -(1 << 25), -1]] {
-            for change in [[0, 0, 0], [1, -1, 0], [-1, 1, 1]] {
-                let now = [0, 1, 2].map(|k| known[k] + change[k]);
-                assert_eq!(image_change(known, pack_image(now)), change, "{known:?}");
-            }
+    fn an_entry_comes_back_as_packed() {
+        let record = Record {
+            position: [1.0, -0.0, 3e-7],
+            velocity: [4.0, 5.0, -6.0],
+            spin: [7.0, 8.0, 9.0],
+            ..Record::zeroed()
+        };
+        for velocities in [false, true] {
+            let mut entry = vec![0; HaloContent { velocities }.words()];
+            pack(&record, [-1, 2, i32::MIN], &mut entry);
+            let mut copy = Record::zeroed();
+            assert_eq!(unpack(&entry, &mut copy), [-1, 2, i32::MIN]);
+            assert_eq!(copy.position.map(f64::to_bits), record.position.map(f64::to_bits));
+            assert_eq!(copy.velocity == record.velocity && copy.spin == record.spin, velocities);
         }
     }
 
     #[test]
-    fn columns_cover_every_image_within_the_margin() {
-        let decomposition = Decomposition { grid: [5, 1, 3] };
-        let around = Neighbourhood {
-            decomposition: &decomposition,
-            sides: [10.0, 10.0, 3.0],
-            periodic: [true, true, false],
-            rank: 0,
-        };
-        for tenth in 0..100 {
-            let (x, margin) = (f64::from(tenth) * 0.1, 2.7);
-            for column in 0..5_usize {
-                let (low, high) = (2.0 * column as f64 - margin, 2.0 * (column + 1) as f64 + margin);
-                let near = (-2..=2).any(|s| (low..high).contains(&(x + 10.0 * f64::from(s))));
-                let listed = around.columns(0, x, margin).contains(&column);
-                assert!(listed || !near, "x = {x}, column {column}");
-            }
-            assert_eq!(around.columns(1, x, margin), [0]);
-        }
-        assert_eq!(around.columns(2, 0.1, 0.5), [0], "no image through a wall");
+    fn one_rank_has_no_ghosts_and_no_border() {
+        let comm = Communicator::single();
+        let grid = Decomposition { grid: [1; 3] };
+        let mut particles = Particles { owned: 1, ..Particles::default() };
+        particles.id.push(0);
+        particles.species.push(0);
+        particles.image.push([0; 3]);
+        particles.record.push(Record { position: [0.01; 3], radius: 0.4, ..Record::zeroed() });
+        let mut plan = HaloPlan::build(&comm, &grid, &mut particles, [1.0; 3], [true; 3], 0.5).expect("valid");
+        assert_eq!((plan.ghosts(), plan.messages(), plan.inner()), (0, 0, [0].as_slice()));
+        assert!(!plan.is_border(0));
+        let mut wrapped = vec![(1, [0; 3])];
+        let content = HaloContent { velocities: true };
+        assert_eq!(plan.update(&comm, &mut particles, content, &mut wrapped, Particles::len), 1);
+        assert!(wrapped.is_empty());
     }
 }

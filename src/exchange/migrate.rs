@@ -1,146 +1,361 @@
-//! Particles to the ranks that own their positions, each with the memory of its contacts.
+//! Particles and their contact memory move to the ranks that own their positions: all of them at the
+//! start, and those that crossed a border at every rebuild. Nothing is lost on the way, which is checked.
 
-use super::redistribute::{block_of, send_memory};
+use super::redistribute::{block_of, check_ids, unknown_id};
+use super::rows::{check_same, push_row, read_rows, read_states};
 use super::{Communicator, Decomposition, agree};
 use crate::error::{Error, Result};
 use crate::state::particles::{Particles, SpeciesConstants};
-use crate::state::{ContactMemory, ParticleState};
-use rustc_hash::FxHashMap;
+use crate::state::{ContactKey, ContactMemory, ParticleState};
+use rustc_hash::{FxHashMap, FxHashSet};
 
-/// What migration must know of the run.
+/// What migration reads beside particles and memory; the same on all ranks.
 #[derive(Debug, Clone, Copy)]
 pub struct MigrationSetting<'a> {
+    /// Who owns which part of the cell.
+    pub decomposition: &'a Decomposition,
     /// Constants per species.
     pub species: &'a [SpeciesConstants],
-    /// Time step that led to the present positions \[s\].
-    pub time_step: f64,
     /// Cell sides \[m\].
     pub sides: [f64; 3],
-    /// Number of particles on all ranks.
-    pub total: u64,
+    /// The step that led to the current state \[s\], see [`Particles::from_states`].
+    pub time_step: f64,
+    /// Number of particles over all ranks; ids from here on are walls.
+    pub particles_total: u64,
+    /// The current step, for messages.
+    pub step: u64,
 }
 
-/// Move owned particles (no ghosts may be there) to the owners of their positions, with every memory
-/// row that names them; drop the rows that no longer concern this rank.
+impl MigrationSetting<'_> {
+    fn fault(&self, message: String) -> Error {
+        Error::Simulation { step: self.step, message }
+    }
+
+    /// Owner of this position on this rank's own authority.
+    fn owner(&self, rank: usize, id: u32, position: [f64; 3]) -> Result<usize> {
+        if position.iter().all(|x| x.is_finite()) {
+            return Ok(self.decomposition.owner(position, self.sides));
+        }
+        Err(self.fault(format!(
+            "rank {rank}: particle {id} is at {position:?} m; the motion is unstable: take a smaller time step, or look \
+             for an extreme overlap at the start"
+        )))
+    }
+}
+
+/// Send each particle outside this rank's box to its owner, with every row of contact memory that
+/// involves it, and drop the rows of which no end is left here. Ghosts are dropped. Particles that stay
+/// keep their order and come before those that arrive. Returns how many moved, over all ranks.
+/// Collective.
+///
+/// A row is held by the owner of each of its ends (walls have none); copies of a row are identical.
 ///
 /// # Errors
-/// Particles were lost or doubled on the way: the sum over ranks is not the total.
+/// [`Error::Simulation`], on all ranks, if a position is not finite, copies of a row differ, or a
+/// particle was lost.
 pub fn migrate(
     comm: &Communicator,
-    decomposition: &Decomposition,
+    setting: &MigrationSetting,
     particles: &mut Particles,
     memory: &mut ContactMemory,
-    setting: &MigrationSetting,
-) -> Result<()> {
-    if comm.size() == 1 {
-        return Ok(());
-    }
+) -> Result<usize> {
+    particles.drop_ghosts();
     let rank = comm.rank();
-    let owner: Vec<usize> =
-        particles.record.iter().map(|record| decomposition.owner(record.position, setting.sides)).collect();
-    let mut moving = [f64::from(u8::from(owner.iter().any(|to| *to != rank)))];
-    comm.max_f64(&mut moving);
-    let to: FxHashMap<u32, usize> = particles.id.iter().copied().zip(owner.iter().copied()).collect();
-    let mut rows: Vec<(usize, usize)> = Vec::new();
-    let mut kept = ContactMemory::new(memory.width);
-    for (row, key) in memory.keys.iter().enumerate() {
-        let (low, high) = (to.get(&key.low).copied(), to.get(&key.high).copied());
-        if low == Some(rank) || high == Some(rank) {
-            kept.push(*key, memory.row(row));
-        }
-        rows.extend(low.filter(|to| *to != rank).map(|to| (row, to)));
-        rows.extend(high.filter(|to| *to != rank && Some(*to) != low).map(|to| (row, to)));
+    let owners: Result<Vec<usize>> = (0..particles.owned)
+        .map(|index| setting.owner(rank, particles.id[index], particles.record[index].position))
+        .collect();
+    let owners = agree(comm, owners)?;
+    if comm.size() == 1 {
+        return Ok(0);
     }
-    if moving[0] != 0.0 {
-        let mut sends = vec![Vec::new(); comm.size()];
-        let mut states = Vec::with_capacity(particles.owned);
-        for (index, to) in owner.iter().enumerate() {
-            let state = particles.state(index);
-            if *to == rank {
-                states.push(state);
-            } else {
-                sends[*to].extend_from_slice(bytemuck::bytes_of(&state));
-            }
-        }
-        for received in comm.all_to_all(sends) {
-            states.extend(bytemuck::pod_collect_to_vec::<u8, ParticleState>(&received));
-        }
-        let received = send_memory(comm, memory, &rows);
-        for (row, key) in received.keys.iter().enumerate() {
-            kept.push(*key, received.row(row));
-        }
-        *particles = Particles::from_states(&states, setting.species, setting.time_step);
+    let before = census(particles);
+    let mut parcels = vec![Parcel::default(); comm.size()];
+    let leaving: FxHashMap<u32, usize> = (0..particles.owned)
+        .filter(|&index| owners[index] != rank)
+        .map(|index| (particles.id[index], owners[index]))
+        .collect();
+    for index in (0..particles.owned).filter(|&index| owners[index] != rank) {
+        parcels[owners[index]].states.push(particles.state(index));
     }
-    *memory = kept.sorted_without_copies();
-    let mut count = [particles.owned as i64];
-    comm.sum_i64(&mut count);
-    if count[0] == setting.total as i64 {
-        return Ok(());
+    if !leaving.is_empty() {
+        keep_owned(particles, |index| owners[index] == rank);
+        hand_over_rows(&mut parcels, &leaving, &particles.id, memory);
     }
-    Err(Error::Layout(format!(
-        "{} particles after migration, {} expected: this is a fault of the program; please report it with the input",
-        count[0], setting.total
+    let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
+    let arriving = Parcel::from_bytes(&received, memory.width);
+    append(particles, Particles::from_states(&arriving.states, setting.species, setting.time_step));
+    agree(comm, merge_rows(memory, &arriving.rows, setting.step))?;
+    let after = census(particles);
+    conserved(comm, setting, [before[0], after[0], before[1], after[1], leaving.len() as i64])
+}
+
+/// Keep the owned particles at these indices, in their order. There are no ghosts.
+fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
+    fn sift<T>(values: &mut Vec<T>, keep: &impl Fn(usize) -> bool) {
+        let mut index = 0;
+        values.retain(|_| {
+            index += 1;
+            keep(index - 1)
+        });
+    }
+    // Naming every field makes the compiler ask here for a field added later.
+    let Particles {
+        owned,
+        id,
+        species,
+        record,
+        image,
+        velocity,
+        acceleration,
+        spin,
+        angular_acceleration,
+        orientation,
+        ledger,
+    } = particles;
+    sift(id, &keep);
+    sift(species, &keep);
+    sift(record, &keep);
+    sift(image, &keep);
+    sift(velocity, &keep);
+    sift(acceleration, &keep);
+    sift(spin, &keep);
+    sift(angular_acceleration, &keep);
+    sift(orientation, &keep);
+    sift(ledger, &keep);
+    *owned = id.len();
+}
+
+/// Append the owned particles of `more`. There are no ghosts.
+fn append(particles: &mut Particles, more: Particles) {
+    let Particles {
+        owned,
+        id,
+        species,
+        record,
+        image,
+        velocity,
+        acceleration,
+        spin,
+        angular_acceleration,
+        orientation,
+        ledger,
+    } = more;
+    particles.owned += owned;
+    particles.id.extend(id);
+    particles.species.extend(species);
+    particles.record.extend(record);
+    particles.image.extend(image);
+    particles.velocity.extend(velocity);
+    particles.acceleration.extend(acceleration);
+    particles.spin.extend(spin);
+    particles.angular_acceleration.extend(angular_acceleration);
+    particles.orientation.extend(orientation);
+    particles.ledger.extend(ledger);
+}
+
+/// Number of owned particles and sum of their ids.
+fn census(particles: &Particles) -> [i64; 2] {
+    [particles.owned as i64, particles.id[..particles.owned].iter().map(|&id| i64::from(id)).sum()]
+}
+
+/// That number and ids are what they were; returns the number of moved particles.
+fn conserved(comm: &Communicator, setting: &MigrationSetting, mut counts: [i64; 5]) -> Result<usize> {
+    comm.sum_i64(&mut counts);
+    let [before, after, ids_before, ids_after, moved] = counts;
+    if before == after && ids_before == ids_after && after as u64 == setting.particles_total {
+        return Ok(moved as usize);
+    }
+    Err(setting.fault(format!(
+        "migration lost particles: there are to be {}, there were {before} (sum of ids {ids_before}) before and \
+         {after} (sum of ids {ids_after}) after; this is an error of the program: report it",
+        setting.particles_total
     )))
 }
 
-/// Particles that lie on any ranks, and contact memory that lies on any ranks, to their owners: a memory
-/// row goes to the owners of both its ends.
-///
-/// # Errors
-/// A particle is missing.
-pub fn distribute(
-    comm: &Communicator,
-    decomposition: &Decomposition,
-    particles: Vec<ParticleState>,
-    memory: ContactMemory,
-    sides: [f64; 3],
-    total: u64,
-) -> Result<(Vec<ParticleState>, ContactMemory)> {
-    let ranks = comm.size();
-    if ranks == 1 {
-        return Ok((particles, memory));
+/// Copy rows to where their ends go, then keep those that still have an end in `staying`.
+fn hand_over_rows(
+    parcels: &mut [Parcel],
+    leaving: &FxHashMap<u32, usize>,
+    staying: &[u32],
+    memory: &mut ContactMemory,
+) {
+    let staying: FxHashSet<u32> = staying.iter().copied().collect();
+    let mut kept = ContactMemory::new(memory.width);
+    for (index, key) in memory.keys.iter().enumerate() {
+        let row = memory.row(index);
+        let (low, high) = (leaving.get(&key.low), leaving.get(&key.high));
+        if let Some(&to) = low {
+            push_row(&mut parcels[to].rows, key, row);
+        }
+        if let Some(&to) = high.filter(|&to| low != Some(to)) {
+            push_row(&mut parcels[to].rows, key, row);
+        }
+        // Walls are never in `staying`: a wall's row goes with its particle.
+        if staying.contains(&key.low) || staying.contains(&key.high) {
+            kept.push(*key, row);
+        }
     }
-    let mut sends = vec![Vec::new(); ranks];
-    for state in &particles {
-        sends[decomposition.owner(state.position, sides)].extend_from_slice(bytemuck::bytes_of(state));
+    *memory = kept;
+}
+
+/// Append rows that are not there yet; those that are must be the same.
+fn merge_rows(memory: &mut ContactMemory, arriving: &ContactMemory, step: u64) -> Result<()> {
+    if arriving.keys.is_empty() {
+        return Ok(());
     }
-    let owned: Vec<ParticleState> = bytemuck::pod_collect_to_vec(&comm.all_to_all(sends).concat());
-    // A directory: the rank that holds the block of an id learns who owns the particle.
-    let mut announcements = vec![Vec::new(); ranks];
-    for state in &owned {
-        let entry = [state.id, comm.rank() as u32];
-        announcements[block_of(state.id, total, ranks)].extend_from_slice(bytemuck::bytes_of(&entry));
-    }
-    let entries: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&comm.all_to_all(announcements).concat());
-    let directory: FxHashMap<u32, usize> = entries.iter().map(|[id, rank]| (*id, *rank as usize)).collect();
-    // Each row visits the directory of its low end and that of its high end.
-    let to_directory = |memory: &ContactMemory, id: fn(&crate::state::ContactKey) -> u32| {
-        let in_range = |id: u32| u64::from(id) < total;
-        let rows: Vec<(usize, usize)> = memory
-            .keys
-            .iter()
-            .enumerate()
-            .filter(|(_, key)| in_range(id(key)))
-            .map(|(row, key)| (row, block_of(id(key), total, ranks)))
-            .collect();
-        send_memory(comm, memory, &rows)
-    };
-    let to_owner = |memory: &ContactMemory, id: fn(&crate::state::ContactKey) -> u32| -> Result<ContactMemory> {
-        let mut rows = Vec::with_capacity(memory.keys.len());
-        let mut missing = Ok(());
-        for (row, key) in memory.keys.iter().enumerate() {
-            match directory.get(&id(key)) {
-                Some(rank) => rows.push((row, *rank)),
-                None => missing = Err(Error::Layout(format!("no rank owns particle {} of a contact", id(key)))),
+    let mut places: FxHashMap<ContactKey, usize> =
+        memory.keys.iter().enumerate().map(|(index, key)| (*key, index)).collect();
+    for (index, key) in arriving.keys.iter().enumerate() {
+        match places.get(key) {
+            Some(&place) => check_same(*key, memory.row(place), arriving.row(index), step)?,
+            None => {
+                places.insert(*key, memory.keys.len());
+                memory.push(*key, arriving.row(index));
             }
         }
-        agree(comm, missing)?;
-        Ok(send_memory(comm, memory, &rows))
-    };
-    let mut mine = to_owner(&to_directory(&memory, |key| key.low), |key| key.low)?;
-    let of_high = to_owner(&to_directory(&memory, |key| key.high), |key| key.high)?;
-    for (row, key) in of_high.keys.iter().enumerate() {
-        mine.push(*key, of_high.row(row));
     }
-    Ok((owned, mine.sorted_without_copies()))
+    Ok(())
+}
+
+/// What one rank sends to another in a migration.
+#[derive(Clone, Default)]
+struct Parcel {
+    states: Vec<ParticleState>,
+    rows: Vec<u8>,
+}
+
+/// All parcels that a rank received, opened.
+struct Arriving {
+    states: Vec<ParticleState>,
+    rows: ContactMemory,
+}
+
+impl Parcel {
+    /// The number of states, the states, the rows; nothing at all if both are empty.
+    fn to_bytes(&self) -> Vec<u8> {
+        if self.states.is_empty() && self.rows.is_empty() {
+            return Vec::new();
+        }
+        let states: &[u8] = bytemuck::cast_slice(&self.states);
+        [&(self.states.len() as u64).to_le_bytes(), states, &self.rows].concat()
+    }
+
+    fn from_bytes(received: &[Vec<u8>], width: usize) -> Arriving {
+        let mut arriving = Arriving { states: Vec::new(), rows: ContactMemory::new(width) };
+        for bytes in received {
+            let Some((count, rest)) = bytes.split_first_chunk() else { continue };
+            let count = u64::from_le_bytes(*count) as usize;
+            let (states, rows) = rest.split_at(count * size_of::<ParticleState>());
+            read_states(states, &mut arriving.states);
+            read_rows(rows, &mut arriving.rows);
+        }
+        arriving
+    }
+}
+
+/// Initial distribution: states held by any ranks go to the owners of their positions, rows of contact
+/// memory to the owners of both ends. Collective; each id and each row is passed by one rank (equal
+/// copies of rows merge).
+///
+/// # Errors
+/// [`Error::Simulation`], on all ranks, if an id is missing, doubled or not below
+/// `setting.particles_total`, or a position is not finite.
+pub fn distribute(
+    comm: &Communicator,
+    setting: &MigrationSetting,
+    states: &[ParticleState],
+    memory: &ContactMemory,
+) -> Result<(Particles, ContactMemory)> {
+    agree(comm, check_ids(states, setting.particles_total, setting.step))?;
+    let owners: Result<Vec<usize>> =
+        states.iter().map(|state| setting.owner(comm.rank(), state.id, state.position)).collect();
+    let owners = agree(comm, owners)?;
+    let mut parcels = vec![Parcel::default(); comm.size()];
+    for (state, &owner) in states.iter().zip(&owners) {
+        parcels[owner].states.push(*state);
+    }
+    let entries = states.iter().zip(&owners).map(|(state, &owner)| [state.id, owner as u32]);
+    let directory = Directory::build(comm, setting, entries)?;
+    let owner_of = directory.look_up(comm, memory)?;
+    for (index, key) in memory.keys.iter().enumerate() {
+        let (low, high) = (owner_of.get(&key.low), owner_of.get(&key.high));
+        for &to in low.into_iter().chain(high.filter(|&to| low != Some(to))) {
+            push_row(&mut parcels[to as usize].rows, key, memory.row(index));
+        }
+    }
+    let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
+    let arriving = Parcel::from_bytes(&received, memory.width);
+    let particles = Particles::from_states(&arriving.states, setting.species, setting.time_step);
+    let mut owned_memory = ContactMemory::new(memory.width);
+    agree(comm, merge_rows(&mut owned_memory, &arriving.rows, setting.step))?;
+    Ok((particles, owned_memory))
+}
+
+/// Who owns which particle, each rank knowing it for one block of ids.
+struct Directory<'a> {
+    setting: &'a MigrationSetting<'a>,
+    owners: FxHashMap<u32, u32>,
+}
+
+impl<'a> Directory<'a> {
+    /// From each rank's pairs (id, owner).
+    fn build(
+        comm: &Communicator,
+        setting: &'a MigrationSetting<'a>,
+        entries: impl Iterator<Item = [u32; 2]>,
+    ) -> Result<Self> {
+        let total = setting.particles_total;
+        let mut sends = vec![Vec::new(); comm.size()];
+        for entry in entries {
+            sends[block_of(u64::from(entry[0]), total, comm.size())].extend_from_slice(bytemuck::bytes_of(&entry));
+        }
+        let mut owners = FxHashMap::default();
+        let mut doubled = None;
+        for bytes in comm.all_to_all(sends) {
+            for pair in bytes.chunks_exact(size_of::<[u32; 2]>()) {
+                let [id, owner]: [u32; 2] = bytemuck::pod_read_unaligned(pair);
+                if owners.insert(id, owner).is_some() {
+                    doubled = Some(id);
+                }
+            }
+        }
+        let unique = doubled.map_or(Ok(()), |id| {
+            Err(setting.fault(format!("particle {id} is given twice; ids must be 0 … {}", total.saturating_sub(1))))
+        });
+        agree(comm, unique)?;
+        let mut known = [owners.len() as i64];
+        comm.sum_i64(&mut known);
+        if known[0] as u64 != total {
+            return Err(setting.fault(format!(
+                "{} particles are given where {total} are expected; ids must be 0 … {}, each once",
+                known[0],
+                total.saturating_sub(1)
+            )));
+        }
+        Ok(Self { setting, owners })
+    }
+
+    /// Owners of all particles that this rank's rows mention.
+    fn look_up(&self, comm: &Communicator, memory: &ContactMemory) -> Result<FxHashMap<u32, u32>> {
+        let total = self.setting.particles_total;
+        let wrong = memory.keys.iter().find(|key| u64::from(key.low) >= total);
+        agree(comm, wrong.map_or(Ok(()), |key| Err(unknown_id(key.low, total, self.setting.step))))?;
+        let mut ids: Vec<u32> = memory.keys.iter().flat_map(|key| [key.low, key.high]).collect();
+        ids.retain(|&id| u64::from(id) < total);
+        ids.sort_unstable();
+        ids.dedup();
+        let mut questions = vec![Vec::new(); comm.size()];
+        for id in &ids {
+            questions[block_of(u64::from(*id), total, comm.size())].extend_from_slice(&id.to_ne_bytes());
+        }
+        let mut answers = comm.all_to_all(questions);
+        for id in answers.iter_mut().flat_map(|bytes| bytes.chunks_exact_mut(size_of::<u32>())) {
+            let owner = self.owners[&bytemuck::pod_read_unaligned::<u32>(id)];
+            id.copy_from_slice(&owner.to_ne_bytes());
+        }
+        // Sorted ids were asked in order of blocks, so the answers in order of ranks match them one by one.
+        let owners = comm.all_to_all(answers);
+        let owners = owners.iter().flat_map(|bytes| bytes.chunks_exact(size_of::<u32>()));
+        Ok(ids.into_iter().zip(owners.map(bytemuck::pod_read_unaligned::<u32>)).collect())
+    }
 }

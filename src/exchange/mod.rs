@@ -7,16 +7,18 @@ pub mod communicator;
 pub mod decomposition;
 pub mod exact_sum;
 pub mod halo;
+mod halo_map;
 pub mod migrate;
 #[cfg(feature = "mpi")]
 mod mpi_backend;
 pub mod redistribute;
+mod rows;
 
 pub use agree::agree;
 pub use communicator::Communicator;
 pub use decomposition::Decomposition;
 pub use exact_sum::ExactSum;
-pub use halo::HaloPlan;
+pub use halo::{HaloContent, HaloPlan};
 pub use migrate::{MigrationSetting, distribute, migrate};
 #[cfg(feature = "mpi")]
 pub use mpi_backend::{RawCommunicator, RawInfo, raw_info_null};

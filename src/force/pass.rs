@@ -212,6 +212,8 @@ impl<C: ContactLaw> LawPass<C> {
         let mut result = PassResult::default();
         let wanted = input.wanted.unwrap_or_default();
         let mut observation = Observation::new(wanted);
+        // Outside the loop: only the law's own columns are ever set.
+        let mut memory = [0.0; MAX_MEMORY];
         for place in 0..slice.count {
             let line = &mut slice.lines[place * input.stride..(place + 1) * input.stride];
             let start = place / BLOCK * BLOCK * C::MEMORY + place % BLOCK;
@@ -237,7 +239,6 @@ impl<C: ContactLaw> LawPass<C> {
             if !within && result.fault.is_none() {
                 result.fault = Some((slice.place + place, pair.touch.overlap / pair.min_radius));
             }
-            let mut memory = [0.0; MAX_MEMORY];
             for (column, value) in memory[..C::MEMORY].iter_mut().enumerate() {
                 *value = slice.memory[start + column * BLOCK];
             }

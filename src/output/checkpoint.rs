@@ -48,7 +48,8 @@ pub struct Latest {
 ///
 /// # Errors
 /// On every rank: [`Error::File`] when the disk has no room or cannot be written (no file remains
-/// then); [`Error::Simulation`] when the global state holds a value that is not finite.
+/// then); [`Error::Simulation`] when the global state holds a value that is not finite, or an id is
+/// missing, doubled or too large.
 #[allow(clippy::too_many_arguments)]
 pub fn write(
     comm: &Communicator,
@@ -61,8 +62,8 @@ pub fn write(
     keep: usize,
 ) -> Result<PathBuf> {
     let json = global_json(global)?;
-    let (first, particles) = redistribute::to_id_blocks(comm, global.particles, particles);
-    let memory = redistribute::memory_to_id_blocks(comm, global.particles, memory);
+    let (first, particles) = redistribute::to_id_blocks(comm, global.particles, particles, global.step)?;
+    let memory = redistribute::memory_to_id_blocks(comm, global.particles, &memory, global.step)?;
     let digest = digest(comm, global, &particles, &memory);
     let mut counts = [memory.keys.len() as i64];
     comm.sum_i64(&mut counts);
@@ -192,6 +193,18 @@ fn prune(directory: &Path, step: u64, keep: usize) -> Result<()> {
     let surplus = (older.len() + 1).saturating_sub(keep.max(1));
     for &old in older.iter().take(surplus) {
         remove(&directory.join(file_name(old)))?;
+    }
+    remove_unfinished(directory)
+}
+
+/// What a kill during a write has left; nobody is writing now.
+fn remove_unfinished(directory: &Path) -> Result<()> {
+    let entries = fs::read_dir(directory).map_err(|error| io_error(directory, "read the folder", &error))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| name.starts_with("checkpoint-") && name.ends_with(".h5.part")) {
+            remove(&entry.path())?;
+        }
     }
     Ok(())
 }
@@ -367,8 +380,7 @@ fn read_block(comm: &Communicator, path: &Path) -> Result<Checkpoint> {
     if rows != global.particles {
         return Err(fault(path, format!("it holds {rows} particles but says {}", global.particles)));
     }
-    let (rank, size) = (comm.rank() as u64, comm.size() as u64);
-    let (start, end) = (rank * rows / size, (rank + 1) * rows / size);
+    let [start, end] = [0, 1].map(|next| redistribute::block_start(comm.rank() + next, rows, comm.size()));
     // Contacts between walls and particles have their low id among the particles: none lies beyond.
     let particles = read_particles(&reader, start, end - start)?;
     let memory = read_contacts(&reader, start, end)?;

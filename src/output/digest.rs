@@ -94,6 +94,7 @@ pub(crate) mod tests {
             stage_start_time: 0.05,
             stage_start_strain: [0.0; 3],
             stage_start_step: 17,
+            stage_start_stress: [0.0; 3],
             history_rows: 3,
             snapshots: 2,
             measured_stress: [1.0e6, -2.5e-3, 7.0],

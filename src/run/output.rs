@@ -34,6 +34,39 @@ pub fn prepare_directory(config: &Config) -> Result<()> {
     fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, error))
 }
 
+/// Rank 0: a restart that writes into another directory first takes over the history and the snapshots
+/// that lie beside the checkpoint, so that the new directory tells the whole run.
+///
+/// # Errors
+/// There is no history beside the checkpoint, or it cannot be copied.
+pub fn take_over(config: &Config, checkpoint: &Path) -> Result<()> {
+    let to = &config.output.directory;
+    let from = checkpoint.parent().unwrap_or(Path::new("."));
+    if to.join("history.csv").exists() {
+        return Ok(());
+    }
+    let copied = |from: &Path, to: &Path| {
+        fs::copy(from, to).map(|_| ()).map_err(|error| Error::File {
+            path: from.to_path_buf(),
+            message: format!(
+                "cannot copy to {} ({error}); a restart into another directory needs the files beside the checkpoint: \
+                 leave it in its run directory, or give that one with --output",
+                to.display()
+            ),
+        })
+    };
+    copied(&from.join("history.csv"), &to.join("history.csv"))?;
+    let Ok(entries) = fs::read_dir(from.join("snapshots")) else { return Ok(()) };
+    fs::create_dir_all(to.join("snapshots")).map_err(|error| Error::File {
+        path: to.join("snapshots"),
+        message: format!("cannot make the folder ({error}); choose another output.directory"),
+    })?;
+    for entry in entries.flatten() {
+        copied(&entry.path(), &to.join("snapshots").join(entry.file_name()))?;
+    }
+    Ok(())
+}
+
 /// Open output of a run on one rank.
 pub struct RunOutput {
     config: Arc<Config>,

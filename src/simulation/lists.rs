@@ -81,12 +81,14 @@ impl Simulation {
         let sides = self.global.sides;
         self.particles.drop_ghosts();
         let setting = MigrationSetting {
+            decomposition: &self.decomposition,
             species: &self.model.species,
-            time_step: self.global.previous_time_step,
             sides,
-            total: self.global.particles,
+            time_step: self.global.previous_time_step,
+            particles_total: self.global.particles,
+            step: self.global.step,
         };
-        migrate(&self.comm, &self.decomposition, &mut self.particles, &mut memory, &setting)?;
+        migrate(&self.comm, &setting, &mut self.particles, &mut memory)?;
         let (low, high) = self.decomposition.bounds(self.comm.rank());
         let region = Region {
             sides,

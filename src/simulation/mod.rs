@@ -9,14 +9,14 @@ mod snapshot;
 mod timers;
 
 pub use report::Report;
-pub use timers::{Stage, Timers};
+pub use timers::{STAGES, Stage, Timers};
 
 use crate::config::{Config, Kinematics};
 use crate::contact::build::BuildContext;
 use crate::contact::list::{ContactList, Partners};
 use crate::contact::shift::ShiftTable;
 use crate::error::Result;
-use crate::exchange::{Communicator, Decomposition, HaloPlan, agree};
+use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, agree};
 use crate::force::geometry::CellMotion;
 use crate::force::law::Column;
 use crate::force::observe::Wanted;
@@ -34,6 +34,9 @@ use std::sync::Arc;
 
 /// Below this many contacts per rank threads cost more than they give.
 const PARALLEL_CONTACTS: usize = 8192;
+
+/// Every law may damp or rub, so ghosts always carry velocities.
+const GHOSTS: HaloContent = HaloContent { velocities: true };
 
 /// What is constant over a run.
 pub struct Model {
@@ -112,11 +115,10 @@ impl Simulation {
         model: Model,
         decomposition: Decomposition,
         global: GlobalState,
-        states: &[ParticleState],
+        particles: Particles,
         memory: ContactMemory,
         threads: usize,
     ) -> Result<Self> {
-        let particles = Particles::from_states(states, &model.species, global.previous_time_step);
         let contacts = model.lists.empty_list();
         let lines = Lines { stride: model.stride(), ..Lines::default() };
         let mut simulation = Self {
@@ -287,7 +289,7 @@ impl Simulation {
     /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
     fn update_ghosts(&mut self) {
         self.ghost_wraps.clear();
-        self.halo.update(&self.comm, &mut self.particles, &mut self.ghost_wraps, |_| ());
+        self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |_| ());
         for (ghost, wraps) in &self.ghost_wraps {
             self.contacts.apply_wrap(*ghost as usize, *wraps);
         }
@@ -315,13 +317,14 @@ impl Simulation {
         self.ghost_wraps.clear();
         let first_ghost = self.contacts.sections.partition_point(|s| s.partners != Partners::Ghost);
         self.timers.start(Stage::Halo);
-        let mut passed = self.halo.update(&self.comm, &mut self.particles, &mut self.ghost_wraps, |particles| {
-            self.timers.start(Stage::Contacts);
-            let sections = &mut self.contacts.sections[..first_ghost];
-            let passed = phase.run(particles, sections, 0, &mut self.lines);
-            self.timers.start(Stage::Halo);
-            passed
-        });
+        let mut passed =
+            self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |particles| {
+                self.timers.start(Stage::Contacts);
+                let sections = &mut self.contacts.sections[..first_ghost];
+                let passed = phase.run(particles, sections, 0, &mut self.lines);
+                self.timers.start(Stage::Halo);
+                passed
+            });
         for (ghost, wraps) in &self.ghost_wraps {
             self.contacts.apply_wrap(*ghost as usize, *wraps);
         }

@@ -28,6 +28,11 @@ impl Source {
         inside.split('/').filter(|part| !matches!(*part, "mod" | "lib" | "main")).collect()
     }
 
+    /// Name of the file without its folder.
+    pub fn file_name(&self) -> &str {
+        self.path.rsplit('/').next().unwrap_or(&self.path)
+    }
+
     /// Tokens of the code without `#[cfg(test)]` modules, which may import whatever they compare with.
     pub fn tokens(&self) -> Vec<Token<'_>> {
         without_test_modules(&tokens(&self.code))

@@ -247,8 +247,15 @@ fn reserve(path: &Path, temporary: &Path, bytes: u64) -> Result<()> {
         .open(temporary)
         .map_err(|error| io_error(path, "create the file", &error))?;
     let length = libc::off_t::try_from(bytes).unwrap_or(libc::off_t::MAX);
-    // SAFETY: the descriptor is open for writing as long as `file` lives.
-    match unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, length) } {
+    let outcome = loop {
+        // SAFETY: the descriptor is open for writing as long as `file` lives.
+        match unsafe { libc::posix_fallocate(file.as_raw_fd(), 0, length) } {
+            // A signal came in between, as before a time limit: try again.
+            libc::EINTR => {}
+            code => break code,
+        }
+    };
+    match outcome {
         // Some file systems cannot reserve; the write itself will then tell.
         0 | libc::EOPNOTSUPP | libc::EINVAL => Ok(()),
         code => {
@@ -360,4 +367,31 @@ fn open_on_all_ranks(comm: &Communicator, temporary: &Path) -> hdf5::Result<hdf5
     }
     debug_assert_eq!(comm.size(), 1, "several ranks have an MPI communicator");
     hdf5::File::open_rw(temporary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_larger_than_the_disk_is_refused_cleanly_before_anything_is_written() {
+        let folder = tempfile::tempdir().expect("folder");
+        let mut layout = Layout::new();
+        layout.dataset("x", Kind::F64, 1_000_000_000_000_000);
+        let path = folder.path().join("big.h5");
+        let message =
+            Writer::create(&Communicator::single(), &path, &layout).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(message.contains("big.h5: cannot reserve the 80000000"), "{message}");
+        assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 0, "nothing is left behind");
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_an_error_that_names_it() {
+        let folder = tempfile::tempdir().expect("folder");
+        let file = folder.path().join("plain_file");
+        fs::write(&file, "x").expect("write");
+        let result = Writer::create(&Communicator::single(), &file.join("a.h5"), &Layout::new());
+        let message = result.err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(message.contains("plain_file"), "{message}");
+    }
 }

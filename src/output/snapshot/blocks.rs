@@ -2,20 +2,8 @@
 
 use super::{SnapshotContact, SnapshotContacts, SnapshotParticle};
 use crate::exchange::Communicator;
+use crate::exchange::redistribute::block_of;
 use bytemuck::Pod;
-
-/// Rank whose block \[r N/P, (r + 1) N/P) holds `id`.
-fn block_of(id: u64, total: u64, size: usize) -> usize {
-    let wide = |rank: usize| (rank as u128 * u128::from(total) / size as u128) as u64;
-    let mut rank = ((u128::from(id) * size as u128 / u128::from(total.max(1))) as usize).min(size - 1);
-    while rank + 1 < size && wide(rank + 1) <= id {
-        rank += 1;
-    }
-    while wide(rank) > id {
-        rank -= 1;
-    }
-    rank
-}
 
 /// First id of the own block, and its particles sorted by id. Collective.
 pub(super) fn particles_by_id(
@@ -55,20 +43,4 @@ pub(super) fn contacts_by_key(comm: &Communicator, total: u64, input: SnapshotCo
 
 fn received<T: Pod>(parts: &[Vec<u8>]) -> Vec<T> {
     parts.iter().flat_map(|part| bytemuck::pod_collect_to_vec::<u8, T>(part)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::block_of;
-
-    #[test]
-    fn blocks_tile_the_ids_for_any_number_of_ranks() {
-        for (total, size) in [(1u64, 3usize), (7, 3), (10, 4), (3, 8), (1000, 7), (5, 5)] {
-            for id in 0..total {
-                let rank = block_of(id, total, size) as u64;
-                let size = size as u64;
-                assert!(rank * total / size <= id && id < (rank + 1) * total / size, "{id} of {total} on {size}");
-            }
-        }
-    }
 }

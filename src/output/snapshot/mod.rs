@@ -83,7 +83,6 @@ pub struct Moment {
 }
 
 /// The snapshots of a run: `snapshots/` in its directory.
-#[derive(Debug)]
 pub struct SnapshotSeries {
     comm: Communicator,
     folder: PathBuf,

@@ -90,6 +90,7 @@ fn resuming_after_more_snapshots_than_there_are_is_an_error() {
     let folder = tempfile::tempdir().expect("folder");
     let mut series = SnapshotSeries::create(&comm, folder.path()).expect("create");
     series.write(&MOMENT, 2, particles(2), None).expect("write");
-    let message = SnapshotSeries::resume(&comm, folder.path(), 2).expect_err("too many").to_string();
+    let message =
+        SnapshotSeries::resume(&comm, folder.path(), 2).err().map(|error| error.to_string()).unwrap_or_default();
     assert!(message.contains("lists 1 snapshots"), "{message}");
 }

@@ -1,0 +1,95 @@
+//! The promise: one input, the same bits, whatever the ranks, threads, decomposition, skin and restarts.
+
+mod common;
+
+use common::{Run, data, digest_of, history_of, launch, scratch};
+
+/// Runs the case and returns (digest, history bytes).
+fn outcome(name: &str, run: &Run, extra: &[&str]) -> (String, Vec<u8>) {
+    let directory = scratch(name);
+    let output = launch(run, &directory, extra);
+    assert!(output.status.success(), "{name}: {}", common::text(&output));
+    (digest_of(&output), history_of(&directory))
+}
+
+fn assert_same_over_layouts(config: &str, extra: &[&str]) {
+    let config = data(config);
+    let reference = outcome("reference", &Run { config: &config, ranks: 1, threads: 1 }, extra);
+    for ranks in [1, 2, 3, 4, 8] {
+        for threads in [1, 2] {
+            for skin in ["0.05", "0.2"] {
+                let skin = format!("parallel.skin={skin}");
+                let options = [extra, &["--set", &skin]].concat();
+                let got = outcome("layout", &Run { config: &config, ranks, threads }, &options);
+                assert_eq!(got, reference, "{ranks} ranks, {threads} threads, {skin}");
+            }
+        }
+    }
+    for grid in ["[1, 1, 4]", "[4, 1, 1]", "[2, 1, 2]"] {
+        let grid = format!("parallel.grid={grid}");
+        let options = [extra, &["--set", &grid]].concat();
+        let got = outcome("grid", &Run { config: &config, ranks: 4, threads: 1 }, &options);
+        assert_eq!(got, reference, "{grid}");
+    }
+}
+
+#[test]
+fn flowing_mixture_has_the_same_bits_over_ranks_threads_skins_and_grids() {
+    assert_same_over_layouts("mixed_flow.toml", &[]);
+}
+
+#[test]
+fn bc_kinematics_have_the_same_bits_too() {
+    let config = data("mixed_flow.toml");
+    let extra = ["--set", "load.kinematics=BC"];
+    let reference = outcome("bc", &Run { config: &config, ranks: 1, threads: 1 }, &extra);
+    for ranks in [2, 3, 8] {
+        let got = outcome("bc", &Run { config: &config, ranks, threads: 1 }, &extra);
+        assert_eq!(got, reference, "{ranks} ranks");
+    }
+}
+
+#[test]
+fn thin_slabs_need_several_hops_and_give_the_same_bits() {
+    let config = data("mixed_flow.toml");
+    let reference = outcome("slabs", &Run { config: &config, ranks: 1, threads: 1 }, &[]);
+    let slabs = ["--set", "parallel.grid=[12, 1, 1]"];
+    let got = outcome("slabs", &Run { config: &config, ranks: 12, threads: 1 }, &slabs);
+    assert_eq!(got, reference);
+}
+
+#[test]
+fn walls_and_gravity_have_the_same_bits_over_ranks() {
+    let config = data("walls.toml");
+    let reference = outcome("walls", &Run { config: &config, ranks: 1, threads: 1 }, &[]);
+    for ranks in [2, 4] {
+        let got = outcome("walls", &Run { config: &config, ranks, threads: 1 }, &[]);
+        assert_eq!(got, reference, "{ranks} ranks");
+    }
+}
+
+#[test]
+fn threads_that_share_the_work_give_the_same_bits() {
+    // Large enough that the pass really splits (the small cases run serially whatever is asked).
+    let config = data("dense_box.toml");
+    let reference = outcome("dense", &Run { config: &config, ranks: 1, threads: 1 }, &[]);
+    for (ranks, threads) in [(1, 2), (1, 4), (2, 2)] {
+        let got = outcome("dense", &Run { config: &config, ranks, threads }, &[]);
+        assert_eq!(got, reference, "{ranks} ranks, {threads} threads");
+    }
+}
+
+#[test]
+fn two_spheres_in_a_cell_of_one_diameter_have_the_same_bits_over_ranks() {
+    // Own images and several images of one partner (W Fig. 8), over subdomains thinner than a sphere.
+    let config = common::root().join("configs/two_spheres.toml");
+    let extra =
+        ["--set", "stage.0.duration=0.5 ms", "--set", "output.plots=false", "--set", "stage.0.strain_rate.z=40 1/s"];
+    let reference = outcome("two", &Run { config: &config, ranks: 1, threads: 1 }, &extra);
+    for grid in ["[1, 1, 2]", "[2, 1, 2]", "[1, 3, 1]"] {
+        let grid = format!("parallel.grid={grid}");
+        let options = [&extra[..], &["--set", &grid]].concat();
+        let got = outcome("two", &Run { config: &config, ranks: 4, threads: 1 }, &options);
+        assert_eq!(got, reference, "{grid}");
+    }
+}
