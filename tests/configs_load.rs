@@ -20,7 +20,9 @@ fn every_configuration_loads_and_its_resolved_text_reruns_the_same() {
                 let again = Config::parse(&config.resolved, &file, &[], None, None);
                 let again = again.unwrap_or_else(|error| panic!("{}:\n{error}\n{}", file.display(), config.resolved));
                 assert_eq!(format!("{config:?}"), format!("{again:?}"), "{}", file.display());
-                assert!(!dem_mpi::config::sheet::sheet(&config).is_empty());
+                let sheet = dem_mpi::config::sheet::sheet(&config);
+                assert!(!sheet.contains("NaN") && !sheet.contains("inf"), "{sheet}");
+                println!("{sheet}");
             }
             Err(error) => failures.push_str(&format!("{error}\n")),
         }

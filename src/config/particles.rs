@@ -31,7 +31,8 @@ fn names_of(sections: &[Section]) -> Vec<String> {
 /// Index of a material by name, or a problem at `key` of `section`.
 pub(super) fn find_material(section: &Section, key: &str, name: &str, names: &[String]) -> Option<usize> {
     let found = names.iter().position(|known| known == name);
-    if found.is_none() {
+    // Without any material, that is the problem to report, not each reference.
+    if found.is_none() && !names.is_empty() {
         let known: Vec<&str> = names.iter().map(String::as_str).filter(|known| !known.is_empty()).collect();
         let near = did_you_mean(name, known.iter().copied());
         section.problem(

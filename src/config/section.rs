@@ -71,6 +71,11 @@ impl<'a> Section<'a> {
         self.node(name).is_some()
     }
 
+    /// Nothing stands in the section.
+    pub fn is_empty(&self) -> bool {
+        self.node.and_then(Node::entries).is_none_or(<[_]>::is_empty)
+    }
+
     pub(super) fn report(&self, place: Place, name: &str, message: String, remedy: String) {
         self.reader.problems.borrow_mut().push(Problem { place, key: self.dotted(name), message, remedy });
     }

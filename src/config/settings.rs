@@ -10,7 +10,7 @@ pub(super) fn read_cell(root: &Section, materials: &[String]) -> Option<CellConf
     let section = root.table("cell")?;
     let sides = section.axes("sides");
     let solid_fraction = section.number("solid_fraction");
-    let aspect = section.axes("aspect");
+    let aspect = if section.given("sides") { Some([1.0; 3]) } else { section.axes("aspect") };
     if section.given("sides") {
         for key in ["solid_fraction", "aspect"].into_iter().filter(|key| section.given(key)) {
             section.problem(key, "given together with `sides`, which settle it", "remove one of the two");
@@ -53,8 +53,8 @@ pub(super) fn read_packing(root: &Section, folder: &Path) -> Option<PackingConfi
                 return None;
             }
             // Absolute, so that the resolved text runs from wherever it is kept.
-            let absolute = std::path::absolute(&path).unwrap_or_else(|_| path.clone());
-            section.record_text("path", &absolute.to_string_lossy());
+            let path = std::path::absolute(&path).unwrap_or(path);
+            section.record_text("path", &path.to_string_lossy());
             Some(PackingConfig::File { path })
         }
         Chosen::Table(_, section) => {

@@ -231,13 +231,13 @@ fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
         table.row("memory", format!("{:.1} MB ({BYTES_PER_PARTICLE} bytes per particle)", bytes / 1e6));
     }
     for species in &config.species {
-        let (mean, max, min) = (species.radius.mean(), species.radius.max(), species.radius.min());
-        let range =
-            if min < max { format!(", {} to {}", quantity(min, "m"), quantity(max, "m")) } else { String::new() };
-        table.row(
-            format!("radius of {}", species.name),
-            format!("{} {}{range}", quantity(mean, "m"), if min < max { "on average" } else { "" }),
-        );
+        let [mean, min, max] = [species.radius.mean(), species.radius.min(), species.radius.max()];
+        let text = if min < max {
+            format!("{} on average, {} to {}", quantity(mean, "m"), quantity(min, "m"), quantity(max, "m"))
+        } else {
+            quantity(mean, "m")
+        };
+        table.row(format!("radius of {}", species.name), text);
     }
     let sides = config.cell.sides.or_else(|| {
         let volume = estimate.solid_volume / estimate.solid_fraction?;
@@ -343,13 +343,14 @@ fn inertial_number(config: &Config, estimate: &Estimate) -> Option<f64> {
         2.0 * s.radius.mean() * (material.density * material.density_scaling).sqrt()
     };
     let size = config.species.iter().map(heaviest).fold(0.0, f64::max);
-    (estimate.inertial_pressure > 0.0).then(|| estimate.rate * size / estimate.inertial_pressure.sqrt())
+    (estimate.inertial_pressure > 0.0 && estimate.rate > 0.0)
+        .then(|| estimate.rate * size / estimate.inertial_pressure.sqrt())
 }
 
 fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
     let inertia = inertia(config, estimate);
-    if inertia > INERTIA_LIMIT {
+    if inertia > 1.01 * INERTIA_LIMIT {
         warnings.push(format!(
             "strain rate² × density scaling is {inertia:.1e} 1/s²; above {INERTIA_LIMIT:.0e} inertia raises the stress of \
              packings near jamming (1.25 to 1.5 times at 1e6): lower density_scaling or the strain rate"
@@ -381,7 +382,43 @@ fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
     warnings
 }
 
-/// Three digits with the unit.
+/// Four digits with the unit.
 fn quantity(value: f64, unit: &str) -> String {
+    if value == 0.0 || (0.01..1e5).contains(&value) {
+        let digits = if value < 1.0 { 4 } else { 2 };
+        let text = format!("{value:.digits$}");
+        return format!("{} {unit}", text.trim_end_matches('0').trim_end_matches('.'));
+    }
     format!("{value:.3e} {unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn config(file: &str, overrides: &[&str]) -> Config {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(file);
+        let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
+        super::super::load(&path, &overrides, None, None).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn the_time_step_of_two_spheres_at_two_percent_is_that_of_the_tangent_stiffness() {
+        let config = config("two_spheres.toml", &[]);
+        let estimate = Estimate::new(&config);
+        assert!((estimate.overlap - 0.04).abs() < 1e-12);
+        let (step, _) = automatic_step(&config, 0.17, estimate.overlap).unwrap();
+        assert!((step - 1.3e-4).abs() < 0.05e-4, "{step}");
+    }
+
+    #[test]
+    fn inertia_and_an_overlap_out_of_bounds_are_warned_of() {
+        let calm = sheet(&config("quickstart.toml", &[]));
+        assert!(!calm.contains("warning"), "{calm}");
+        let fast = sheet(&config("quickstart.toml", &["stage.0.strain_rate={z=0.2}", "time_step=\"1 s\""]));
+        for part in ["lower density_scaling", "contact.max_overlap_fraction", "larger than the automatic one"] {
+            assert!(fast.contains(part), "{fast}");
+        }
+    }
 }

@@ -147,6 +147,9 @@ fn one_axis(section: &Section, name: &str) -> Option<(usize, f64)> {
     let table = section.table(name)?;
     let values = AXES.map(|axis| table.number(axis));
     let given: Vec<usize> = (0..3).filter(|axis| table.given(AXES[*axis])).collect();
+    if given.is_empty() && !table.is_empty() {
+        return None; // unknown axes, reported as such
+    }
     let [axis] = given[..] else {
         section.problem(
             name,
