@@ -112,7 +112,7 @@ pub fn gas() -> Result<Vec<Claim>> {
     Ok(claims)
 }
 
-/// A sphere bobbing on a wall under gravity without leaving it, at three fixed time steps, against a
+/// A sphere bobbing on a wall under gravity without leaving it, at four fixed time steps, against a
 /// Runge–Kutta solution of `m z̈ = 4/3 E √R (R−z)^{3/2} − m g`.
 pub fn order() -> Result<Vec<Claim>> {
     const RADIUS: f64 = 5e-3;
