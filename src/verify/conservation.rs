@@ -82,7 +82,7 @@ fn gas_run(time_step: f64, restitution: f64, friction: f64) -> Result<GasRun> {
         &mut simulation,
         |global| Wanted { sums: global.step == 0 || global.stage > 0, ledger: true, ..Wanted::default() },
         |_, report| {
-            ends.push(report.row.clone());
+            ends.push(report.row);
             Ok(())
         },
     )?;
