@@ -12,7 +12,7 @@ pub mod tournament;
 #[cfg(test)]
 mod test_input;
 
-use crate::config::{Boundary, CellConfig, Config, PackingConfig, Species};
+use crate::config::{Boundary, CellConfig, Config, Motion, PackingConfig, Species};
 use crate::error::{Error, Result};
 use crate::state::{LEDGER, ParticleState};
 use grid::{Ball, Cell};
@@ -114,8 +114,11 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
         .enumerate()
         .map(|(id, row)| {
             let mut particle = at_rest_in_its_species(config, id, row.species, row.position, row.radius);
-            particle.velocity = row.velocity.unwrap_or(particle.velocity);
-            particle.spin = row.spin.unwrap_or(particle.spin);
+            // What is prescribed stays prescribed, whatever the file says.
+            if config.species[row.species as usize].motion == Motion::Free {
+                particle.velocity = row.velocity.unwrap_or(particle.velocity);
+                particle.spin = row.spin.unwrap_or(particle.spin);
+            }
             particle
         })
         .collect();
@@ -125,14 +128,18 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
 /// A particle with the initial velocity and spin of its species and nothing behind it.
 fn at_rest_in_its_species(config: &Config, id: usize, species: u32, position: [f64; 3], radius: f64) -> ParticleState {
     let of_species = &config.species[species as usize];
+    let (velocity, spin) = match of_species.motion {
+        Motion::Driven { velocity, spin } => (velocity, spin),
+        Motion::Free => (initial_velocity(config.seed, id, of_species), of_species.spin),
+    };
     ParticleState {
         id: id as u32,
         species,
         position,
         radius,
-        velocity: initial_velocity(config.seed, id, of_species),
+        velocity,
         acceleration: [0.0; 3],
-        spin: of_species.spin,
+        spin,
         angular_acceleration: [0.0; 3],
         orientation: [1.0, 0.0, 0.0, 0.0],
         ledger: [0.0; LEDGER.len()],
