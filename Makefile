@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint bench build install docs serial static setup setup-test
+.PHONY: help demo test lint bench build install docs serial static setup setup-test
 
 # Before each command: PATH, root and HDF5 as this machine needs them.
 ENVIRONMENT := . scripts/environment.sh; hdf5_dir=$$(parallel_hdf5_dir); \
@@ -16,7 +16,6 @@ CARGO_FLAGS := --locked
 help:
 	@echo "make demo       install what is missing, build, run the quickstart on two ranks"
 	@echo "make test       the same set-up, then all tests"
-	@echo "make test-long  the tests that take minutes (kill and restart, large packings)"
 	@echo "make lint       formatting, clippy, architecture, scripts"
 	@echo "make bench      particle-steps/s on one and two ranks and threads"
 	@echo "make build      build the program"
@@ -44,9 +43,6 @@ test: setup-test
 	@$(ENVIRONMENT) cargo test --release $(CARGO_FLAGS)
 	@scripts/check_snapshots.sh "$(TARGET)/release/dem-mpi"
 	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" verify
-
-test-long: setup
-	@$(ENVIRONMENT) cargo test --release $(CARGO_FLAGS) -- --ignored
 
 lint: setup
 	@$(ENVIRONMENT) cargo fmt --check
