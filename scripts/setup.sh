@@ -27,13 +27,18 @@ done
 say() { echo "setup: $*"; }
 has() { command -v "$1" >/dev/null 2>&1; }
 
+# A file named like libclang itself: libclang-cpp, which comes with other packages, is another library.
+is_libclang() {
+    grep -v 'libclang-cpp' | grep 'libclang[-.]' >/dev/null
+}
+
 has_libclang() {
-    compgen -G "${LIBCLANG_PATH:-/nowhere}/libclang*" >/dev/null && return 0
-    compgen -G '/usr/lib/llvm-*/lib/libclang*.so*' >/dev/null && return 0
-    compgen -G '/usr/lib*/libclang*.so*' >/dev/null && return 0
-    has ldconfig && ldconfig -p | grep libclang >/dev/null && return 0
-    has llvm-config && compgen -G "$(llvm-config --libdir)/libclang*" >/dev/null && return 0
-    compgen -G '/Library/Developer/CommandLineTools/usr/lib/libclang*' >/dev/null
+    compgen -G "${LIBCLANG_PATH:-/nowhere}/libclang*" | is_libclang && return 0
+    compgen -G '/usr/lib/llvm-*/lib/libclang*.so*' | is_libclang && return 0
+    compgen -G '/usr/lib*/libclang*.so*' | is_libclang && return 0
+    has ldconfig && ldconfig -p | is_libclang && return 0
+    has llvm-config && compgen -G "$(llvm-config --libdir)/libclang*" | is_libclang && return 0
+    compgen -G '/Library/Developer/CommandLineTools/usr/lib/libclang*' | is_libclang
 }
 
 has_parallel_hdf5() {
