@@ -165,7 +165,7 @@ impl Run {
         let global = self.simulation.global();
         let history = is_due(self.config.output.history, global, global.history_rows);
         let snapshot = self.config.output.snapshots.is_some_and(|every| is_due(every, global, global.snapshots));
-        Wanted { sums: history, samples: snapshot, ledger: false }
+        Wanted { sums: history, samples: snapshot }
     }
 
     fn requests(&self) -> Requests {
@@ -206,7 +206,7 @@ impl Run {
         self.checkpoint()?;
         let (particles, memory) = self.simulation.export()?;
         let digest = digest::digest(self.simulation.comm(), self.simulation.global(), &particles, &memory);
-        let wanted = Wanted { sums: true, samples: self.config.output.snapshots.is_some(), ledger: false };
+        let wanted = Wanted { sums: true, samples: self.config.output.snapshots.is_some() };
         let report = self.simulation.observe(wanted)?;
         self.output.write(&mut self.simulation, &report, wanted)?;
         let steps = self.simulation.global().step - self.first_step;

@@ -5,6 +5,7 @@ use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
 use crate::exchange::{Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum};
 use crate::force::pass;
+use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
 use crate::output::checkpoint::Checkpoint;
@@ -161,6 +162,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         max_radius: extremes.max_radius,
         solid_volume: extremes.solid_volume,
         rotation: turns,
+        simd: agree(comm, Simd::choose(config.parallel.simd))?,
     };
     agree(comm, check_fit(&model, initial))?;
     Ok(model)
@@ -245,7 +247,7 @@ pub fn simulation(
         decomposition: &decomposition,
         species: &model.species,
         sides: initial.global.sides,
-        time_step: initial.global.previous_time_step,
+        extras: model.extras(),
         particles_total: initial.global.particles,
         step: initial.global.step,
     };

@@ -341,6 +341,12 @@ pub static OUTPUT: Table = Table {
             Default::Flag(false),
             "Keep account of work and dissipation by cause; costs some speed.",
         ),
+        key(
+            "orientations",
+            Kind::Flag,
+            Default::Flag(false),
+            "Follow the orientations of spheres, for pictures; costs some speed.",
+        ),
         key("plots", Kind::Flag, Default::Flag(true), "Draw plots at the end."),
     ],
 };
@@ -362,6 +368,12 @@ pub static PARALLEL: Table = Table {
             Kind::Integer(1),
             Default::Integer(1000),
             "The automatic grid gives no rank fewer.",
+        ),
+        key(
+            "simd",
+            Kind::Choice(&["auto", "scalar", "avx2", "avx512"]),
+            Default::Word("auto"),
+            "Vector instructions; `auto` takes the widest that the processor has.",
         ),
     ],
 };

@@ -309,6 +309,8 @@ pub struct OutputConfig {
     pub checkpoints_kept: usize,
     /// Keep the energy ledger (work, dissipation by cause); costs some speed.
     pub energy_ledger: bool,
+    /// Follow the orientations of spheres.
+    pub orientations: bool,
     /// Draw plots at the end.
     pub plots: bool,
 }
@@ -333,4 +335,19 @@ pub struct ParallelConfig {
     pub skin: f64,
     /// The automatic grid gives no rank fewer particles than this.
     pub min_particles_per_rank: usize,
+    /// Vector instructions.
+    pub simd: SimdConfig,
+}
+
+/// Which vector instructions the contact passes use; no effect on results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimdConfig {
+    /// The widest that the processor has.
+    Auto,
+    /// None: one contact at a time.
+    Scalar,
+    /// AVX2: four contacts at a time.
+    Avx2,
+    /// AVX-512: eight contacts at a time.
+    Avx512,
 }

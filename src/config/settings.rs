@@ -2,7 +2,7 @@
 
 use super::alternatives::Chosen;
 use super::section::Section;
-use super::{Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, Species, TimeStepConfig};
+use super::{Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, SimdConfig, Species, TimeStepConfig};
 use std::path::{Path, PathBuf};
 
 /// Read `[cell]`.
@@ -137,6 +137,7 @@ pub(super) fn read_output(root: &Section, stem: &str) -> Option<OutputConfig> {
     let checkpoint_wall_time = section.number("checkpoint_wall_time");
     let checkpoints_kept = section.integer("checkpoints_kept");
     let energy_ledger = section.flag("energy_ledger");
+    let orientations = section.flag("orientations");
     let plots = section.flag("plots");
     Some(OutputConfig {
         directory: PathBuf::from(directory?),
@@ -147,9 +148,13 @@ pub(super) fn read_output(root: &Section, stem: &str) -> Option<OutputConfig> {
         checkpoint_wall_time,
         checkpoints_kept: usize::try_from(checkpoints_kept?).ok()?,
         energy_ledger: energy_ledger?,
+        orientations: orientations?,
         plots: plots?,
     })
 }
+
+/// What the words of `simd` mean, in their order.
+const SIMD_LEVELS: [SimdConfig; 4] = [SimdConfig::Auto, SimdConfig::Scalar, SimdConfig::Avx2, SimdConfig::Avx512];
 
 /// Read `[parallel]`.
 pub(super) fn read_parallel(root: &Section) -> Option<ParallelConfig> {
@@ -158,10 +163,12 @@ pub(super) fn read_parallel(root: &Section) -> Option<ParallelConfig> {
     let threads = section.integer("threads");
     let skin = section.number("skin");
     let min_particles_per_rank = section.integer("min_particles_per_rank");
+    let simd = section.choice("simd").map(|index| SIMD_LEVELS[index]);
     Some(ParallelConfig {
         grid,
         threads: threads.and_then(|count| usize::try_from(count).ok()),
         skin: skin?,
         min_particles_per_rank: usize::try_from(min_particles_per_rank?).ok()?,
+        simd: simd?,
     })
 }

@@ -1,11 +1,20 @@
-//! From the Verlet list to the list of contacts, with the memory carried over.
+//! From the Verlet list to the list of contacts. Contacts that stay keep their memory where it is; after a
+//! new Verlet list it comes back by identity.
 
-use super::list::{BLOCK, ContactList, Partners, Section};
+use super::list::ContactList;
+use super::section::{PARTNERS, Partners, Section};
 use super::shift;
-use crate::neighbour::verlet::Candidate;
+use crate::neighbour::verlet::Candidates;
 use crate::state::particles::Particles;
 use crate::state::{ContactKey, ContactMemory};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+/// The candidate is in the list of contacts.
+const LISTED: u32 = 1 << Candidates::FREE_BIT;
+/// Number of the candidate's section within its strip, from this bit on.
+const SECTION_BIT: u32 = Candidates::FREE_BIT + 1;
 
 /// What the builder must know beside particles and candidates.
 #[derive(Debug, Clone)]
@@ -38,99 +47,124 @@ impl BuildContext {
         self.columns.iter().copied().max().unwrap_or(0)
     }
 
-    /// An empty list with the sections of all pairs: owned partners first, then walls, then ghosts, so
-    /// that what needs no halo comes first.
-    #[must_use]
-    pub fn empty_list(&self) -> ContactList {
-        let mut list = ContactList::default();
-        for partners in [Partners::Owned, Partners::Wall, Partners::Ghost] {
-            for (pair, columns) in self.columns.iter().enumerate() {
-                list.sections.push(Section::new(pair, partners, *columns));
+    /// Empty `list` and cut it into strips; mark every candidate with its section.
+    pub fn start(
+        &self,
+        list: &mut ContactList,
+        particles: &Particles,
+        candidates: &mut Candidates,
+        strips: Vec<Range<usize>>,
+        inner: usize,
+    ) {
+        list.cut(strips, inner, &self.columns);
+        let material = |index: usize| self.material[particles.species[index] as usize];
+        let here = u32::from(shift::encode([0; 3]));
+        for strip in &list.strips {
+            for owner in strip.particles.clone() {
+                for place in candidates.offsets[owner] as usize..candidates.offsets[owner + 1] as usize {
+                    let (partner, code) = (candidates.partner[place] as usize, &mut candidates.code[place]);
+                    let partners = if partner >= particles.owned {
+                        Partners::Ghost
+                    } else if partner < strip.particles.end && *code & (LISTED - 1) & !Candidates::PARTNER_FIRST == here
+                    {
+                        Partners::Near
+                    } else {
+                        Partners::Apart
+                    };
+                    let section = self.section_of(partners, self.pair_index(material(owner), material(partner)));
+                    *code |= (section as u32) << SECTION_BIT;
+                }
             }
         }
-        list
     }
 
     fn section_of(&self, partners: Partners, pair: usize) -> usize {
-        let group = match partners {
-            Partners::Owned => 0,
-            Partners::Wall => 1,
-            Partners::Ghost => 2,
-        };
-        group * self.columns.len() + pair
+        partners as usize * self.columns.len() + pair
     }
 
-    /// Refill `list` with all candidates and walls nearer than the inner skin, and give back the memory
-    /// that `memory` holds for them.
-    pub fn fill(
+    /// Bring `list` up to date: all candidates and walls nearer than the inner skin, those that stay with
+    /// their memory, new ones without. `crossed` are the images that each local particle crossed since the
+    /// candidates were found.
+    pub fn refresh(
         &self,
         list: &mut ContactList,
         particles: &Particles,
         sides: [f64; 3],
-        candidates: &[Candidate],
-        memory: &ContactMemory,
+        candidates: &mut Candidates,
+        crossed: &[[i8; 4]],
     ) {
-        for section in &mut list.sections {
-            section.clear();
+        let per_strip = list.per_strip();
+        let mut work = Vec::with_capacity(list.strips.len());
+        let mut codes = candidates.code.as_mut_slice();
+        let mut done = 0;
+        for (strip, sections) in list.strips.iter().zip(list.sections.chunks_mut(per_strip)) {
+            let end = candidates.offsets[strip.particles.end] as usize;
+            let (own, rest) = codes.split_at_mut(end - done);
+            work.push((strip.particles.clone(), sections, own));
+            (codes, done) = (rest, end);
         }
-        let rows = Rows::new(memory);
-        for candidate in candidates {
-            self.add_pair(list, particles, sides, candidate, &rows);
-        }
-        self.add_walls(list, particles, sides, &rows);
+        let (offsets, partners) = (&candidates.offsets, &candidates.partner);
+        work.into_par_iter().for_each(|(owners, sections, code)| {
+            let view = StripView { context: self, particles, sides, crossed, offsets, partners, owners };
+            view.refresh(sections, code);
+            self.refresh_walls(sections, &view.owners, particles, sides);
+        });
         list.index(particles, self.total);
     }
 
-    fn add_pair(
-        &self,
-        list: &mut ContactList,
-        particles: &Particles,
-        sides: [f64; 3],
-        candidate: &Candidate,
-        rows: &Rows,
-    ) {
-        let (first, second) = (candidate.first as usize, candidate.second as usize);
-        let (a, b) = (&particles.record[first], &particles.record[second]);
-        let shift = [0, 1, 2].map(|k| candidate.shift[k] + particles.image[second][k] - particles.image[first][k]);
-        let d = [0, 1, 2].map(|k| b.position[k] + f64::from(shift[k]) * sides[k] - a.position[k]);
-        let sum = a.radius + b.radius + self.skin;
-        if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] >= sum * sum {
+    fn refresh_walls(&self, sections: &mut [Section], owners: &Range<usize>, particles: &Particles, sides: [f64; 3]) {
+        if self.walls.iter().all(Option::is_none) {
             return;
         }
-        let ghost = first >= particles.owned || second >= particles.owned;
-        let partners = if ghost { Partners::Ghost } else { Partners::Owned };
-        let material = |index: usize| self.material[particles.species[index] as usize];
-        let section = self.section_of(partners, self.pair_index(material(first), material(second)));
-        let section = &mut list.sections[section];
-        let place = section.push(candidate.first, candidate.second, shift::encode(shift));
-        let key = ContactKey {
-            low: particles.id[first],
-            high: particles.id[second],
-            shift: [shift[0], shift[1], shift[2], 0],
-        };
-        if let Some(row) = rows.find(&key) {
-            section.write_memory(place, row);
-        }
-    }
-
-    fn add_walls(&self, list: &mut ContactList, particles: &Particles, sides: [f64; 3], rows: &Rows) {
-        for (axis, side) in sides.iter().enumerate() {
-            let Some(wall_material) = self.walls[axis] else { continue };
-            for index in 0..particles.owned {
-                let record = &particles.record[index];
+        let mut old: Vec<(Section, usize)> = (0..self.columns.len())
+            .map(|pair| {
+                let section = &mut sections[self.section_of(Partners::Wall, pair)];
+                let empty = Section::new(pair, Partners::Wall, section.columns, 0);
+                (std::mem::replace(section, empty), 0)
+            })
+            .collect();
+        let mut row = vec![0.0; self.memory_width()];
+        for index in owners.clone() {
+            let record = &particles.record[index];
+            for (axis, material) in self.walls.iter().enumerate().filter_map(|(axis, wall)| Some((axis, (*wall)?))) {
                 for high in [false, true] {
-                    let distance = if high { side - record.position[axis] } else { record.position[axis] };
+                    let distance = if high { sides[axis] - record.position[axis] } else { record.position[axis] };
                     if distance >= record.radius + self.skin || record.inverse_mass == 0.0 {
                         continue;
                     }
                     let wall = 2 * axis as u32 + u32::from(high);
-                    let pair = self.pair_index(self.material[particles.species[index] as usize], wall_material);
-                    let section = &mut list.sections[self.section_of(Partners::Wall, pair)];
-                    let place = section.push(index as u32, wall, shift::encode([0; 3]));
-                    let key = ContactKey { low: particles.id[index], high: self.total + wall, shift: [0; 4] };
-                    if let Some(row) = rows.find(&key) {
-                        section.write_memory(place, row);
+                    let pair = self.pair_index(self.material[particles.species[index] as usize], material);
+                    let section = &mut sections[self.section_of(Partners::Wall, pair)];
+                    let place = section.count;
+                    section.resize(place + 1);
+                    section.set(place, index as u32, wall, shift::encode([0; 3]));
+                    // Both lists are in order of particle and wall.
+                    let (before, cursor) = &mut old[pair];
+                    let key = |place: usize| (before.first[place], before.second[place]);
+                    while *cursor < before.count && key(*cursor) < (index as u32, wall) {
+                        *cursor += 1;
                     }
+                    if *cursor < before.count && key(*cursor) == (index as u32, wall) {
+                        before.read_memory(*cursor, &mut row);
+                        section.write_memory(place, &row);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Give the contacts of a list without memory the rows that `memory` holds for them.
+    pub fn restore(&self, list: &mut ContactList, particles: &Particles, memory: &ContactMemory) {
+        if memory.keys.is_empty() {
+            return;
+        }
+        let rows = Rows::new(memory, particles);
+        for number in 0..list.sections.len() {
+            for place in 0..list.sections[number].count {
+                let key = list.key(number, place, particles, self.total);
+                let first = list.sections[number].first_of(place);
+                if let Some(row) = rows.find(first, &key) {
+                    list.sections[number].write_memory(place, row);
                 }
             }
         }
@@ -143,12 +177,9 @@ impl BuildContext {
         let width = self.memory_width();
         let mut memory = ContactMemory::new(width);
         let mut row = vec![0.0; width];
-        for (number, section) in list.sections.iter().enumerate() {
-            if section.columns == 0 {
-                continue;
-            }
+        for (number, section) in list.sections.iter().enumerate().filter(|(_, section)| section.columns > 0) {
             for place in 0..section.count {
-                if only_owned_low && section.first[place] as usize >= particles.owned {
+                if only_owned_low && section.first_of(place) >= particles.owned {
                     continue;
                 }
                 row.fill(0.0);
@@ -162,20 +193,135 @@ impl BuildContext {
     }
 }
 
-/// Look-up of memory rows by identity.
+/// The candidates of one strip's particles.
+struct StripView<'a> {
+    context: &'a BuildContext,
+    particles: &'a Particles,
+    sides: [f64; 3],
+    crossed: &'a [[i8; 4]],
+    offsets: &'a [u32],
+    partners: &'a [u32],
+    owners: Range<usize>,
+}
+
+/// A candidate as a contact: its first and second particle and their shift now.
+struct Pair {
+    first: usize,
+    second: usize,
+    shift: [i32; 3],
+}
+
+impl StripView<'_> {
+    fn pair(&self, owner: usize, partner: usize, code: u32) -> Pair {
+        let (first, second) = if code & Candidates::PARTNER_FIRST == 0 { (owner, partner) } else { (partner, owner) };
+        let then = shift::decode((code & 511) as u16);
+        let (a, b) = (self.crossed[first], self.crossed[second]);
+        Pair { first, second, shift: [0, 1, 2].map(|k| then[k] + i32::from(b[k]) - i32::from(a[k])) }
+    }
+
+    fn is_near(&self, pair: &Pair) -> bool {
+        let (a, b) = (&self.particles.record[pair.first], &self.particles.record[pair.second]);
+        let d = [0, 1, 2].map(|k| b.position[k] + f64::from(pair.shift[k]) * self.sides[k] - a.position[k]);
+        let sum = a.radius + b.radius + self.context.skin;
+        d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < sum * sum
+    }
+
+    /// Two sweeps over the candidates, in whose order the contacts of each section lie: forward to close the
+    /// gaps that contacts leave, backward to open gaps for new ones.
+    fn refresh(&self, sections: &mut [Section], code: &mut [u32]) {
+        const NEW: u32 = 1 << 31;
+        let base = self.offsets[self.owners.start] as usize;
+        let mut read = vec![0; sections.len()];
+        let mut write = vec![0; sections.len()];
+        let mut count = vec![0; sections.len()];
+        for owner in self.owners.clone() {
+            for place in self.offsets[owner] as usize..self.offsets[owner + 1] as usize {
+                let code = &mut code[place - base];
+                let number = ((*code & !NEW) >> SECTION_BIT) as usize;
+                let near = self.is_near(&self.pair(owner, self.partners[place] as usize, *code));
+                count[number] += usize::from(near);
+                if *code & LISTED != 0 {
+                    if near {
+                        if read[number] != write[number] {
+                            sections[number].relocate(read[number], write[number]);
+                        }
+                        write[number] += 1;
+                    } else {
+                        *code &= !LISTED;
+                    }
+                    read[number] += 1;
+                } else if near {
+                    *code |= NEW;
+                }
+            }
+        }
+        for (number, section) in sections.iter_mut().enumerate().filter(|(_, s)| s.partners != Partners::Wall) {
+            section.resize(write[number]);
+            section.resize(count[number]);
+        }
+        for owner in self.owners.clone().rev() {
+            if write == count {
+                break;
+            }
+            for place in (self.offsets[owner] as usize..self.offsets[owner + 1] as usize).rev() {
+                let code = &mut code[place - base];
+                let number = ((*code & !NEW) >> SECTION_BIT) as usize;
+                if *code & NEW != 0 {
+                    let pair = self.pair(owner, self.partners[place] as usize, *code);
+                    let section = &mut sections[number];
+                    let origin = section.origin;
+                    count[number] -= 1;
+                    section.set(
+                        count[number],
+                        (pair.first - origin) as u32,
+                        (pair.second - origin) as u32,
+                        shift::encode(pair.shift),
+                    );
+                    *code = *code & !NEW | LISTED;
+                } else if *code & LISTED != 0 {
+                    count[number] -= 1;
+                    write[number] -= 1;
+                    if write[number] != count[number] {
+                        sections[number].relocate(write[number], count[number]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Look-up of memory rows by identity: the rows of each local particle that is the first of a contact.
 struct Rows<'a> {
     memory: &'a ContactMemory,
-    index: FxHashMap<ContactKey, u32>,
+    offsets: Vec<u32>,
+    rows: Vec<u32>,
 }
 
 impl<'a> Rows<'a> {
-    fn new(memory: &'a ContactMemory) -> Self {
-        let index = memory.keys.iter().enumerate().map(|(row, key)| (*key, row as u32)).collect();
-        Self { memory, index }
+    fn new(memory: &'a ContactMemory, particles: &Particles) -> Self {
+        let local: FxHashMap<u32, u32> = (0..).zip(&particles.id).map(|(local, id)| (*id, local)).collect();
+        let first: Vec<Option<u32>> = memory.keys.iter().map(|key| local.get(&key.low).copied()).collect();
+        let mut offsets = vec![0_u32; particles.len() + 2];
+        for place in first.iter().flatten() {
+            offsets[*place as usize + 2] += 1;
+        }
+        for place in 2..offsets.len() {
+            offsets[place] += offsets[place - 1];
+        }
+        let mut rows = vec![0; memory.keys.len()];
+        for (row, place) in first.iter().enumerate().filter_map(|(row, place)| Some((row, (*place)?))) {
+            let slot = &mut offsets[place as usize + 1];
+            rows[*slot as usize] = row as u32;
+            *slot += 1;
+        }
+        Self { memory, offsets, rows }
     }
-    fn find(&self, key: &ContactKey) -> Option<&'a [f64]> {
-        self.index.get(key).map(|row| self.memory.row(*row as usize))
+
+    fn find(&self, first: usize, key: &ContactKey) -> Option<&'a [f64]> {
+        let range = self.offsets[first] as usize..self.offsets[first + 1] as usize;
+        let row = self.rows[range].iter().find(|row| self.memory.keys[**row as usize] == *key)?;
+        Some(self.memory.row(*row as usize))
     }
 }
 
-const _: () = assert!(BLOCK == 8, "memory blocks are laid out for eight lanes");
+const _: () = assert!(PARTNERS.len() == 4, "a section's number within its strip has its place in the candidate's code");

@@ -1,104 +1,62 @@
-//! The list of contacts that touch or nearly do, in sections of equal law, with their memory in
-//! blocks of eight, and for every particle its contacts in the order of summation.
+//! The list of contacts that touch or nearly do, and for every particle its contacts in the order of
+//! summation.
+//!
+//! The owned particles of a rank are cut into strips: runs of consecutive local indices, one per thread. A
+//! contact belongs to the strip of its owner, the particle with the lower local index. Within a strip the
+//! step goes chunk by chunk: contacts owned by the chunk's particles, then sum and motion of these
+//! particles, whose contacts are then complete. So the output lines of contacts within the strip are
+//! needed for a short while only and live in a ring buffer; those of all other contacts are kept for the step.
 
+use super::section::{BLOCK, PARTNERS, Partners, Section};
 use super::shift;
 use crate::state::ContactKey;
 use crate::state::particles::Particles;
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Contacts per memory block: memory lies as `[column][8]` per block.
-pub const BLOCK: usize = 8;
+/// Particles per chunk.
+pub const CHUNK: usize = 64;
 
-/// What the two ends of the contacts of a section are.
+/// Some blocks of a section, evaluated in one go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Partners {
-    /// Two owned particles.
-    Owned,
-    /// An owned particle and a ghost.
-    Ghost,
-    /// An owned particle and a plane wall; `second` is the wall, 2·axis + side.
-    Wall,
+pub struct Run {
+    /// Number of the section.
+    pub section: u32,
+    /// First block.
+    pub block: u32,
+    /// Number of blocks.
+    pub blocks: u32,
+    /// Number of the first block's first output line.
+    pub line: u32,
 }
 
-/// Contacts of one pair of materials with the same kind of partners. Padded to whole blocks; the
-/// padding repeats particle 0 with a far image and is never read.
-#[derive(Debug, Clone)]
-pub struct Section {
-    /// Index of the pair of materials.
-    pub pair: usize,
-    /// Kind of partners.
-    pub partners: Partners,
-    /// Contacts without the padding.
-    pub count: usize,
-    /// Local index of the particle with the lower global id.
-    pub first: Vec<u32>,
-    /// Local index of the other particle (or the wall).
-    pub second: Vec<u32>,
-    /// Packed image shift of the second.
-    pub shift: Vec<u16>,
-    /// Memory columns of this pair's law.
-    pub columns: usize,
-    /// Memory, `[block][column][8]`.
-    pub memory: Vec<f64>,
-    /// Number of the first contact's output line.
-    pub base: usize,
+/// Owned particles that one thread moves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Strip {
+    /// Local indices.
+    pub particles: Range<usize>,
+    /// Runs of the near contacts: for each chunk one per pair of materials.
+    pub near: Range<usize>,
+    /// Kept lines of this strip.
+    pub kept: Range<usize>,
+    /// Number of the first near line.
+    pub first_line: usize,
+    /// Lines that the ring must hold, a power of two.
+    pub ring: usize,
 }
 
-impl Section {
-    /// An empty section.
+impl Strip {
+    /// Chunks.
     #[must_use]
-    pub fn new(pair: usize, partners: Partners, columns: usize) -> Self {
-        Self {
-            pair,
-            partners,
-            count: 0,
-            first: Vec::new(),
-            second: Vec::new(),
-            shift: Vec::new(),
-            columns,
-            memory: Vec::new(),
-            base: 0,
-        }
+    pub fn chunks(&self) -> usize {
+        self.particles.len().div_ceil(CHUNK)
     }
 
-    /// Forget all contacts, keep the buffers.
-    pub fn clear(&mut self) {
-        self.count = 0;
-        self.first.clear();
-        self.second.clear();
-        self.shift.clear();
-        self.memory.clear();
-    }
-
-    /// Append a contact with zero memory; returns its place.
-    pub fn push(&mut self, first: u32, second: u32, code: u16) -> usize {
-        let place = self.count;
-        if place.is_multiple_of(BLOCK) {
-            self.first.resize(place + BLOCK, 0);
-            self.second.resize(place + BLOCK, 0);
-            self.shift.resize(place + BLOCK, shift::encode([shift::MAX_SHIFT; 3]));
-            self.memory.resize((place + BLOCK) * self.columns, 0.0);
-        }
-        self.first[place] = first;
-        self.second[place] = second;
-        self.shift[place] = code;
-        self.count += 1;
-        place
-    }
-
-    /// Copy the memory of a contact out; columns beyond this law's stay untouched.
-    pub fn read_memory(&self, place: usize, row: &mut [f64]) {
-        let start = place / BLOCK * BLOCK * self.columns + place % BLOCK;
-        for (column, value) in row.iter_mut().enumerate().take(self.columns) {
-            *value = self.memory[start + column * BLOCK];
-        }
-    }
-
-    /// Set the memory of a contact from a row.
-    pub fn write_memory(&mut self, place: usize, row: &[f64]) {
-        let start = place / BLOCK * BLOCK * self.columns + place % BLOCK;
-        for (column, value) in row.iter().enumerate().take(self.columns) {
-            self.memory[start + column * BLOCK] = *value;
-        }
+    /// Local indices of a chunk.
+    #[must_use]
+    pub fn chunk(&self, chunk: usize) -> Range<usize> {
+        let start = self.particles.start + chunk * CHUNK;
+        start..(start + CHUNK).min(self.particles.end)
     }
 }
 
@@ -130,17 +88,50 @@ impl End {
 /// id, image shift seen from the particle): the order in which forces are summed on every rank.
 #[derive(Debug, Clone, Default)]
 pub struct ContactList {
-    /// Sections; output lines are numbered through them.
+    /// Strips: first those whose particles no other rank sees, then the others.
+    pub strips: Vec<Strip>,
+    /// Number of strips whose particles no other rank sees.
+    pub inner: usize,
+    /// Pairs of materials.
+    pub pairs: usize,
+    /// Sections, `4 · pairs` per strip: for each of [`PARTNERS`] one per pair.
     pub sections: Vec<Section>,
+    /// All runs, in order of their lines: kept contacts first, one run per section.
+    pub runs: Vec<Run>,
+    /// Number of kept lines.
+    pub kept: usize,
+    /// Number of output lines, padding included.
+    pub lines: usize,
     /// `ends[offsets[p]..offsets[p+1]]` are those of local particle `p`.
     pub offsets: Vec<u32>,
     /// Ends of all particles.
     pub ends: Vec<End>,
-    /// Number of output lines, padding included.
-    pub lines: usize,
+    keyed: Vec<(u64, End)>,
 }
 
 impl ContactList {
+    /// Empty sections for particles cut into strips; `columns` are the memory columns per pair of materials.
+    pub fn cut(&mut self, strips: Vec<Range<usize>>, inner: usize, columns: &[usize]) {
+        self.inner = inner;
+        self.pairs = columns.len();
+        self.sections.clear();
+        for particles in &strips {
+            for partners in PARTNERS {
+                let origin = if partners == Partners::Near { particles.start } else { 0 };
+                let sections = columns.iter().enumerate();
+                self.sections.extend(sections.map(|(pair, columns)| Section::new(pair, partners, *columns, origin)));
+            }
+        }
+        let strip = |particles| Strip { particles, near: 0..0, kept: 0..0, first_line: 0, ring: BLOCK };
+        self.strips = strips.into_iter().map(strip).collect();
+    }
+
+    /// Sections per strip.
+    #[must_use]
+    pub fn per_strip(&self) -> usize {
+        PARTNERS.len() * self.pairs
+    }
+
     /// The ends of a local particle.
     #[inline(always)]
     #[must_use]
@@ -157,8 +148,8 @@ impl ContactList {
     /// Section and place of an output line.
     #[must_use]
     pub fn locate(&self, line: usize) -> (usize, usize) {
-        let section = self.sections.partition_point(|s| s.base + s.first.len() <= line);
-        (section, line - self.sections[section].base)
+        let run = self.runs[self.runs.partition_point(|run| run.line as usize <= line) - 1];
+        (run.section as usize, run.block as usize * BLOCK + line - run.line as usize)
     }
 
     /// A particle was wrapped by `wraps` images (+1: it left through the high face): adjust the shifts
@@ -182,64 +173,156 @@ impl ContactList {
     #[must_use]
     pub fn key(&self, section: usize, place: usize, particles: &Particles, total: u32) -> ContactKey {
         let section = &self.sections[section];
-        let low = particles.id[section.first[place] as usize];
-        let second = section.second[place];
+        let low = particles.id[section.first_of(place)];
         let (high, shift) = if section.partners == Partners::Wall {
-            (total + second, [0; 3])
+            (total + section.second[place], [0; 3])
         } else {
-            (particles.id[second as usize], shift::decode(section.shift[place]))
+            (particles.id[section.second_of(place)], shift::decode(section.shift[place]))
         };
         ContactKey { low, high, shift: [shift[0], shift[1], shift[2], 0] }
     }
 
     /// Number the output lines and order every particle's ends. Call after filling the sections.
     pub fn index(&mut self, particles: &Particles, total: u32) {
-        self.lines = 0;
-        for section in &mut self.sections {
-            section.base = self.lines;
-            self.lines += section.first.len();
+        self.number_lines();
+        self.order_ends(particles, total);
+    }
+
+    fn number_lines(&mut self) {
+        let per_strip = self.per_strip();
+        let Self { strips, sections, runs, pairs, .. } = self;
+        runs.clear();
+        let mut line = 0;
+        for (number, strip) in strips.iter_mut().enumerate() {
+            let start = line;
+            for section in number * per_strip + *pairs..(number + 1) * per_strip {
+                let blocks = sections[section].blocks();
+                runs.push(Run { section: section as u32, block: 0, blocks: blocks as u32, line: line as u32 });
+                line += blocks * BLOCK;
+            }
+            strip.kept = start..line;
         }
+        self.kept = line;
+        for (number, strip) in strips.iter_mut().enumerate() {
+            let near = &sections[number * per_strip..number * per_strip + *pairs];
+            let from = runs.len();
+            strip.first_line = line;
+            let mut reached = vec![0; *pairs];
+            for chunk in 0..strip.chunks() {
+                let end = (chunk + 1) * CHUNK;
+                for (pair, section) in near.iter().enumerate() {
+                    let block = reached[pair];
+                    let mut place = block * BLOCK;
+                    while place < section.count && owner(section, place) < end {
+                        place += 1;
+                    }
+                    let blocks = place.div_ceil(BLOCK) - block;
+                    let section = (number * per_strip + pair) as u32;
+                    runs.push(Run { section, block: block as u32, blocks: blocks as u32, line: line as u32 });
+                    line += blocks * BLOCK;
+                    reached[pair] += blocks;
+                }
+            }
+            strip.near = from..runs.len();
+            strip.ring = ring_of(strip, &runs[strip.near.clone()], near, number * per_strip, line);
+        }
+        self.lines = line;
+    }
+
+    fn order_ends(&mut self, particles: &Particles, total: u32) {
         let locals = particles.len();
-        self.offsets.clear();
-        self.offsets.resize(locals + 1, 0);
-        for section in &self.sections {
+        let Self { sections, runs, offsets, ends, keyed, .. } = self;
+        offsets.clear();
+        offsets.resize(locals + 2, 0);
+        // Counted two places on, so that filling leaves the starts where they belong.
+        for section in sections.iter() {
             for place in 0..section.count {
-                self.offsets[section.first[place] as usize + 1] += 1;
+                offsets[section.first_of(place) + 2] += 1;
                 if section.partners != Partners::Wall {
-                    self.offsets[section.second[place] as usize + 1] += 1;
+                    offsets[section.second_of(place) + 2] += 1;
                 }
             }
         }
         for particle in 0..locals {
-            self.offsets[particle + 1] += self.offsets[particle];
+            offsets[particle + 2] += offsets[particle + 1];
         }
-        let mut next = self.offsets.clone();
-        let mut keyed = vec![(0_u64, End(0)); self.offsets[locals] as usize];
-        let mut place_end = |particle: u32, key: u64, end: End| {
-            let slot = &mut next[particle as usize];
+        keyed.clear();
+        keyed.resize(offsets[locals + 1] as usize, (0, End(0)));
+        let mut place_end = |particle: usize, key: u64, end: End| {
+            let slot = &mut offsets[particle + 1];
             keyed[*slot as usize] = (key, end);
             *slot += 1;
         };
-        for section in &self.sections {
-            for place in 0..section.count {
-                let (first, second, line) = (section.first[place], section.second[place], section.base + place);
+        for run in runs.iter() {
+            let section = &sections[run.section as usize];
+            let places = run.block as usize * BLOCK..((run.block + run.blocks) as usize * BLOCK).min(section.count);
+            for (line, place) in (run.line as usize..).zip(places) {
+                let first = section.first_of(place);
                 if section.partners == Partners::Wall {
-                    place_end(first, order_key(total + second, [0; 3]), End::new(line, false));
+                    place_end(first, order_key(total + section.second[place], [0; 3]), End::new(line, false));
                 } else {
+                    let second = section.second_of(place);
                     let shift = shift::decode(section.shift[place]);
-                    place_end(first, order_key(particles.id[second as usize], shift), End::new(line, false));
-                    let back = shift.map(|s| -s);
-                    place_end(second, order_key(particles.id[first as usize], back), End::new(line, true));
+                    place_end(first, order_key(particles.id[second], shift), End::new(line, false));
+                    place_end(second, order_key(particles.id[first], shift.map(|s| -s)), End::new(line, true));
                 }
             }
         }
-        for particle in 0..locals {
-            keyed[self.offsets[particle] as usize..self.offsets[particle + 1] as usize]
-                .sort_unstable_by_key(|(key, _)| *key);
-        }
-        self.ends.clear();
-        self.ends.extend(keyed.into_iter().map(|(_, end)| end));
+        offsets.pop();
+        ends.clear();
+        ends.resize(keyed.len(), End(0));
+        sort_ends(offsets, keyed, ends);
     }
+}
+
+/// Sort the ends of each particle by their keys, on all threads.
+fn sort_ends(offsets: &[u32], keyed: &mut [(u64, End)], ends: &mut [End]) {
+    const GRAIN: usize = 4096;
+    let particles = offsets.len() - 1;
+    if particles > GRAIN {
+        let middle = particles / 2;
+        let cut = (offsets[middle] - offsets[0]) as usize;
+        let (keyed_low, keyed_high) = keyed.split_at_mut(cut);
+        let (ends_low, ends_high) = ends.split_at_mut(cut);
+        rayon::join(
+            || sort_ends(&offsets[..=middle], keyed_low, ends_low),
+            || sort_ends(&offsets[middle..], keyed_high, ends_high),
+        );
+        return;
+    }
+    for window in offsets.windows(2) {
+        let range = (window[0] - offsets[0]) as usize..(window[1] - offsets[0]) as usize;
+        keyed[range].sort_unstable_by_key(|(key, _)| *key);
+    }
+    for (end, (_, sorted)) in ends.iter_mut().zip(keyed) {
+        *end = *sorted;
+    }
+}
+
+/// Owner of a near contact, counted from the start of its strip.
+fn owner(section: &Section, place: usize) -> usize {
+    section.first[place].min(section.second[place]) as usize
+}
+
+/// Lines that must be there together: from a contact's own to the last one evaluated before the particle
+/// at its other end is summed.
+fn ring_of(strip: &Strip, runs: &[Run], near: &[Section], first_section: usize, last: usize) -> usize {
+    let pairs = near.len();
+    let reached = |chunk: usize| runs.get((chunk + 1) * pairs).map_or(last, |run| run.line as usize);
+    let longest = runs.par_chunks(pairs.max(1)).map(|chunk| {
+        let spans = chunk.iter().flat_map(|run| {
+            let section = &near[run.section as usize - first_section];
+            let places = run.block as usize * BLOCK..((run.block + run.blocks) as usize * BLOCK).min(section.count);
+            places.map(move |place| {
+                let other = section.first[place].max(section.second[place]) as usize;
+                let line = run.line as usize + (place / BLOCK - run.block as usize) * BLOCK;
+                reached(other / CHUNK) - line
+            })
+        });
+        spans.max().unwrap_or(BLOCK)
+    });
+    debug_assert!(strip.first_line <= last);
+    longest.max().unwrap_or(BLOCK).next_power_of_two()
 }
 
 /// Orders by partner id, then by shift, x first.

@@ -3,4 +3,5 @@
 
 pub mod build;
 pub mod list;
+pub mod section;
 pub mod shift;

@@ -22,7 +22,8 @@ pub fn decode(code: u16) -> [i32; 3] {
 /// Values of `shift · factor` per axis for the eight codes: what the pass adds to a pair vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftTable {
-    axes: [[f64; 8]; 3],
+    /// Entry `s + 4` of an axis.
+    pub axes: [[f64; 8]; 3],
 }
 
 impl ShiftTable {

@@ -33,7 +33,7 @@ struct Arrival {
     species: u32,
     image: [i32; 3],
     /// Keeps the layout free of hidden padding.
-    reserved: i32,
+    reserved: [i32; 3],
 }
 
 /// Messages to or from one rank: a run of entries of the packed buffer.
@@ -63,6 +63,25 @@ pub struct HaloPlan {
 }
 
 impl HaloPlan {
+    /// Which of the owned particles other ranks need, by the rule of [`HaloPlan::build`].
+    #[must_use]
+    pub fn seen_elsewhere(
+        comm: &Communicator,
+        decomposition: &Decomposition,
+        particles: &Particles,
+        sides: [f64; 3],
+        periodic: [bool; 3],
+        reach: f64,
+    ) -> Vec<bool> {
+        let map = HaloMap::new(decomposition, comm.rank(), sides, periodic, reach);
+        let seen = |record: &Record| {
+            let mut seen = false;
+            map.for_each_needing(record.position, record.radius + reach, |_| seen = true);
+            seen
+        };
+        particles.record[..particles.owned].iter().map(seen).collect()
+    }
+
     /// Work out who needs which particle and exchange the ghosts. Collective.
     ///
     /// On entry `particles` holds owned particles only, each inside this rank's box (right after
@@ -134,7 +153,7 @@ impl HaloPlan {
                     id: particles.id[index],
                     species: particles.species[index],
                     image: particles.image[index],
-                    reserved: 0,
+                    reserved: [0; 3],
                 }
             })
             .collect();
@@ -149,7 +168,7 @@ impl HaloPlan {
     }
 
     /// Refresh the ghosts; `meanwhile` runs on the particles while the messages fly (it sees the ghosts as
-    /// they were). All ranks call it, with the same content.
+    /// they were; what is sent was taken before it). All ranks call it, with the same content.
     ///
     /// Position and image counters always come, full-step velocity and spin if asked; what is not asked
     /// keeps its old value. `wrapped` is replaced by the ghosts that crossed a periodic face since the last
@@ -160,7 +179,7 @@ impl HaloPlan {
         particles: &mut Particles,
         content: HaloContent,
         wrapped: &mut Vec<(u32, [i32; 3])>,
-        meanwhile: impl FnOnce(&Particles) -> R,
+        meanwhile: impl FnOnce(&mut Particles) -> R,
     ) -> R {
         let words = content.words();
         self.outgoing.resize(self.send_index.len() * words, 0);

@@ -5,7 +5,7 @@ use super::redistribute::{block_of, check_ids, unknown_id};
 use super::rows::{check_same, push_row, read_rows, read_states};
 use super::{Communicator, Decomposition, agree};
 use crate::error::{Error, Result};
-use crate::state::particles::{Particles, SpeciesConstants};
+use crate::state::particles::{Extras, Particles, SpeciesConstants};
 use crate::state::{ContactKey, ContactMemory, ParticleState};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -18,8 +18,8 @@ pub struct MigrationSetting<'a> {
     pub species: &'a [SpeciesConstants],
     /// Cell sides \[m\].
     pub sides: [f64; 3],
-    /// The step that led to the current state \[s\], see [`Particles::from_states`].
-    pub time_step: f64,
+    /// What of a particle is followed.
+    pub extras: Extras,
     /// Number of particles over all ranks; ids from here on are walls.
     pub particles_total: u64,
     /// The current step, for messages.
@@ -83,7 +83,7 @@ pub fn migrate(
     }
     let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
     let arriving = Parcel::from_bytes(&received, memory.width);
-    append(particles, Particles::from_states(&arriving.states, setting.species, setting.time_step));
+    append(particles, Particles::from_states(&arriving.states, setting.species, setting.extras));
     agree(comm, merge_rows(memory, &arriving.rows, setting.step))?;
     let after = census(particles);
     conserved(comm, setting, [before[0], after[0], before[1], after[1], leaving.len() as i64])
@@ -99,27 +99,13 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
         });
     }
     // Naming every field makes the compiler ask here for a field added later.
-    let Particles {
-        owned,
-        id,
-        species,
-        record,
-        image,
-        velocity,
-        acceleration,
-        spin,
-        angular_acceleration,
-        orientation,
-        ledger,
-    } = particles;
+    let Particles { owned, id, species, record, image, velocity, spin, orientation, ledger } = particles;
     sift(id, &keep);
     sift(species, &keep);
     sift(record, &keep);
     sift(image, &keep);
     sift(velocity, &keep);
-    sift(acceleration, &keep);
     sift(spin, &keep);
-    sift(angular_acceleration, &keep);
     sift(orientation, &keep);
     sift(ledger, &keep);
     *owned = id.len();
@@ -127,28 +113,14 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
 
 /// Append the owned particles of `more`. There are no ghosts.
 fn append(particles: &mut Particles, more: Particles) {
-    let Particles {
-        owned,
-        id,
-        species,
-        record,
-        image,
-        velocity,
-        acceleration,
-        spin,
-        angular_acceleration,
-        orientation,
-        ledger,
-    } = more;
+    let Particles { owned, id, species, record, image, velocity, spin, orientation, ledger } = more;
     particles.owned += owned;
     particles.id.extend(id);
     particles.species.extend(species);
     particles.record.extend(record);
     particles.image.extend(image);
     particles.velocity.extend(velocity);
-    particles.acceleration.extend(acceleration);
     particles.spin.extend(spin);
-    particles.angular_acceleration.extend(angular_acceleration);
     particles.orientation.extend(orientation);
     particles.ledger.extend(ledger);
 }
@@ -284,7 +256,7 @@ pub fn distribute(
     }
     let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
     let arriving = Parcel::from_bytes(&received, memory.width);
-    let particles = Particles::from_states(&arriving.states, setting.species, setting.time_step);
+    let particles = Particles::from_states(&arriving.states, setting.species, setting.extras);
     let mut owned_memory = ContactMemory::new(memory.width);
     agree(comm, merge_rows(&mut owned_memory, &arriving.rows, setting.step))?;
     Ok((particles, owned_memory))

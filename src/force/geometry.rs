@@ -1,6 +1,6 @@
 //! Geometry and relative motion of touching spheres and walls, from packed records.
 
-use super::lane::{add, cross, dot, scale, sub};
+use super::lane::{Lane, RECORD, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
 use crate::contact::shift::ShiftTable;
 use crate::state::particles::Record;
@@ -24,76 +24,111 @@ pub struct CellMotion {
     pub wall_velocity: [f64; 3],
 }
 
-/// A touch with what the output line needs beside the law's view.
+/// Records of one side of some contacts, transposed.
 #[derive(Debug, Clone, Copy)]
-pub struct PairTouch {
-    /// The law's view.
-    pub touch: Touch<f64>,
-    /// Branch vector d from first to second \[m\] (wall: to the wall plane).
-    pub branch: [f64; 3],
-    /// The part of the relative velocity that the cell's motion imposes \[m/s\].
-    pub imposed_velocity: [f64; 3],
-    /// Distance of the contact point from the first's centre along n \[m\].
-    pub arm_first: f64,
-    /// Distance of the contact point from the second's centre \[m\].
-    pub arm_second: f64,
-    /// Smaller radius \[m\].
-    pub min_radius: f64,
+pub struct Bodies<L> {
+    /// Wrapped positions \[m\].
+    pub position: Vector<L>,
+    /// Radii \[m\].
+    pub radius: L,
+    /// Velocities at the full step \[m/s\].
+    pub velocity: Vector<L>,
+    /// 1/m \[1/kg\].
+    pub inverse_mass: L,
+    /// Angular velocities at the full step \[rad/s\].
+    pub spin: Vector<L>,
 }
 
-/// Touch of two spheres; `None` if they do not touch. The contact point lies on the line of centres at
-/// `R_i − δ R_j/(R_i+R_j)` from i.
+impl<L: Lane> Bodies<L> {
+    /// The records of the first `L::WIDTH` indices.
+    #[inline(always)]
+    #[must_use]
+    pub fn gather(records: &[Record], index: &[u32]) -> Self {
+        let c: [L; RECORD] = L::gather(records, index);
+        Self {
+            position: [c[0], c[1], c[2]],
+            radius: c[3],
+            velocity: [c[4], c[5], c[6]],
+            inverse_mass: c[7],
+            spin: [c[8], c[9], c[10]],
+        }
+    }
+}
+
+/// A touch with what the output line needs beside the law's view.
+#[derive(Debug, Clone, Copy)]
+pub struct PairTouch<L: Lane> {
+    /// Lanes that touch; what the others hold means nothing.
+    pub touching: L::Mask,
+    /// The law's view.
+    pub touch: Touch<L>,
+    /// Branch vector d from first to second \[m\] (wall: to the wall plane).
+    pub branch: Vector<L>,
+    /// The part of the relative velocity that the cell's motion imposes \[m/s\].
+    pub imposed_velocity: Vector<L>,
+    /// Distance of the contact point from the first's centre along n \[m\].
+    pub arm_first: L,
+    /// Distance of the contact point from the second's centre \[m\].
+    pub arm_second: L,
+    /// Smaller radius \[m\].
+    pub min_radius: L,
+}
+
+/// Touch of two spheres a and b, b in the image of its packed shift. The contact point lies on the line of
+/// centres at `R_i − δ R_j/(R_i+R_j)` from i. NaN counts as touching, so that it is found.
 ///
 /// # Source
 /// PHYSICS.md section 1.
 #[inline(always)]
 #[must_use]
-pub fn spheres(a: &Record, b: &Record, code: u16, motion: &CellMotion) -> Option<PairTouch> {
-    let branch = sub(add(b.position, motion.shift.vector(code)), a.position);
+pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
+    let image = |table: &ShiftTable| {
+        [
+            L::look_up(&table.axes[0], codes, 0),
+            L::look_up(&table.axes[1], codes, 3),
+            L::look_up(&table.axes[2], codes, 6),
+        ]
+    };
+    let branch = sub(add(b.position, image(&motion.shift)), a.position);
     let distance_squared = dot(branch, branch);
     let sum = a.radius + b.radius;
-    // Cheap exclusion first; what passes by rounding is caught by the tolerance below.
-    if distance_squared >= sum * sum {
-        return None;
-    }
     let distance = distance_squared.sqrt();
     let overlap = sum - distance;
-    if overlap <= TOUCH_TOLERANCE * sum {
-        return None;
-    }
-    let normal = scale(branch, 1.0 / distance);
-    let imposed = add(motion.shift_velocity.vector(code), [0, 1, 2].map(|k| motion.gradient[k] * branch[k]));
-    let velocity = add(sub(b.velocity, a.velocity), imposed);
-    let share = overlap / sum;
+    // The first catches what the square root rounds away.
+    let apart = distance_squared.at_least(sum * sum) | (L::splat(TOUCH_TOLERANCE) * sum).at_least(overlap);
+    let normal = scale(branch, L::splat(1.0) / distance);
+    let [gx, gy, gz] = motion.gradient;
+    let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
+    let imposed_velocity = add(image(&motion.shift_velocity), affine);
+    let velocity = add(sub(b.velocity, a.velocity), imposed_velocity);
+    let per_sum = L::splat(1.0) / sum;
+    let share = overlap * per_sum;
     let (arm_first, arm_second) = (a.radius - share * b.radius, b.radius - share * a.radius);
     let approach = dot(velocity, normal);
     let turning = cross(add(scale(a.spin, arm_first), scale(b.spin, arm_second)), normal);
     let touch = Touch {
         overlap,
         overlap_rate: -approach,
-        effective_radius: a.radius * b.radius / sum,
-        effective_mass: 1.0 / (a.inverse_mass + b.inverse_mass),
+        effective_radius: a.radius * b.radius * per_sum,
+        effective_mass: L::splat(1.0) / (a.inverse_mass + b.inverse_mass),
         normal,
         slip_velocity: sub(sub(velocity, scale(normal, approach)), turning),
         relative_spin: sub(b.spin, a.spin),
-        mean_spin: scale(add(a.spin, b.spin), 0.5),
+        mean_spin: scale(add(a.spin, b.spin), L::splat(0.5)),
     };
-    let min_radius = if a.radius < b.radius { a.radius } else { b.radius };
-    Some(PairTouch { touch, branch, imposed_velocity: imposed, arm_first, arm_second, min_radius })
+    let min_radius = a.radius.min(b.radius);
+    PairTouch { touching: !apart, touch, branch, imposed_velocity, arm_first, arm_second, min_radius }
 }
 
-/// Touch of a sphere and a plane wall (2·axis + side); `None` if they do not touch. The wall has
-/// infinite mass and no curvature; it moves with the cell face and does not turn.
+/// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves
+/// with the cell face and does not turn.
 #[inline(always)]
 #[must_use]
-pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> Option<PairTouch> {
+pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> PairTouch<f64> {
     let axis = (wall / 2) as usize;
     let high = wall % 2 == 1;
     let (gap, sign) = if high { (motion.sides[axis] - a.position[axis], 1.0) } else { (a.position[axis], -1.0) };
     let overlap = a.radius - gap;
-    if overlap <= TOUCH_TOLERANCE * a.radius {
-        return None;
-    }
     let unit = [0, 1, 2].map(|k| if k == axis { sign } else { 0.0 });
     let branch = scale(unit, gap);
     let moving = if high { motion.wall_velocity[axis] } else { 0.0 };
@@ -112,5 +147,13 @@ pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> Option<PairTouch> {
         relative_spin: scale(a.spin, -1.0),
         mean_spin: scale(a.spin, 0.5),
     };
-    Some(PairTouch { touch, branch, imposed_velocity: imposed, arm_first: gap, arm_second: 0.0, min_radius: a.radius })
+    PairTouch {
+        touching: !(TOUCH_TOLERANCE * a.radius).at_least(overlap),
+        touch,
+        branch,
+        imposed_velocity: imposed,
+        arm_first: gap,
+        arm_second: 0.0,
+        min_radius: a.radius,
+    }
 }

@@ -1,6 +1,17 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
+use crate::state::particles::Record;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+#[cfg(target_arch = "x86_64")]
+pub mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub mod avx512;
+#[cfg(test)]
+pub mod portable;
+
+/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, mass.
+pub const RECORD: usize = size_of::<Record>() / size_of::<f64>();
 
 /// One or several `f64` side by side. Every operation is the IEEE one per lane, so that any width
 /// gives the bits of the scalar one. No fused multiply-add.
@@ -38,8 +49,23 @@ pub trait Lane:
     fn less(self, other: Self) -> Self::Mask;
     /// `self > other`.
     fn greater(self, other: Self) -> Self::Mask;
+    /// `self >= other`.
+    fn at_least(self, other: Self) -> Self::Mask;
     /// Lane by lane: `if mask { yes } else { no }` (a blend, never a product).
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// True in some lane.
+    fn any(mask: Self::Mask) -> bool;
+    /// Value of a mask in one lane.
+    fn lane(mask: Self::Mask, lane: usize) -> bool;
+    /// The records of `WIDTH` particles, transposed: entry `c` holds number `c` of each record.
+    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD];
+    /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
+    fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
+    /// `table[(code >> bits) & 7]` for the first `WIDTH` codes.
+    fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self;
+    /// Ask for the records of the first `WIDTH` particles to be brought near. Changes nothing.
+    #[inline(always)]
+    fn prefetch(_records: &[Record], _index: &[u32]) {}
 }
 
 impl Lane for f64 {
@@ -78,134 +104,32 @@ impl Lane for f64 {
         self > other
     }
     #[inline(always)]
+    fn at_least(self, other: Self) -> bool {
+        self >= other
+    }
+    #[inline(always)]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
-}
-
-/// Eight `f64` side by side in plain loops: no intrinsics, so it runs anywhere, and it proves in tests
-/// that a law written over [`Lane`] gives each lane the scalar bits.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Portable8(pub [f64; 8]);
-
-/// Result of comparisons of [`Portable8`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PortableMask8(pub [bool; 8]);
-
-impl Portable8 {
     #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    fn any(mask: bool) -> bool {
+        mask
     }
     #[inline(always)]
-    fn compare(self, other: Self, f: impl Fn(f64, f64) -> bool) -> PortableMask8 {
-        PortableMask8(std::array::from_fn(|k| f(self.0[k], other.0[k])))
-    }
-}
-
-impl Add for Portable8 {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-}
-
-impl Sub for Portable8 {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-}
-
-impl Mul for Portable8 {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-}
-
-impl Div for Portable8 {
-    type Output = Self;
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
-    }
-}
-
-impl Neg for Portable8 {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(self.0.map(|a| -a))
-    }
-}
-
-impl BitAnd for PortableMask8 {
-    type Output = Self;
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        Self(std::array::from_fn(|k| self.0[k] & other.0[k]))
-    }
-}
-
-impl BitOr for PortableMask8 {
-    type Output = Self;
-    #[inline(always)]
-    fn bitor(self, other: Self) -> Self {
-        Self(std::array::from_fn(|k| self.0[k] | other.0[k]))
-    }
-}
-
-impl Not for PortableMask8 {
-    type Output = Self;
-    #[inline(always)]
-    fn not(self) -> Self {
-        Self(self.0.map(|a| !a))
-    }
-}
-
-impl Lane for Portable8 {
-    type Mask = PortableMask8;
-    const WIDTH: usize = 8;
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        Self([value; 8])
+    fn lane(mask: bool, _lane: usize) -> bool {
+        mask
     }
     #[inline(always)]
-    fn load(values: &[f64]) -> Self {
-        let values = &values[..8];
-        Self(std::array::from_fn(|k| values[k]))
+    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
+        bytemuck::cast(records[index[0] as usize])
     }
     #[inline(always)]
-    fn store(self, values: &mut [f64]) {
-        values[..8].copy_from_slice(&self.0);
+    fn scatter(values: [Self; 4], rows: &mut [f64], _stride: usize, offset: usize) {
+        rows[offset..offset + 4].copy_from_slice(&values);
     }
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-    #[inline(always)]
-    fn less(self, other: Self) -> PortableMask8 {
-        self.compare(other, |a, b| a < b)
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> PortableMask8 {
-        self.compare(other, |a, b| a > b)
-    }
-    #[inline(always)]
-    fn select(mask: PortableMask8, yes: Self, no: Self) -> Self {
-        Self(std::array::from_fn(|k| if mask.0[k] { yes.0[k] } else { no.0[k] }))
+    fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {
+        table[usize::from((codes[0] >> bits) & 7)]
     }
 }
 

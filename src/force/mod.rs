@@ -14,6 +14,7 @@ pub mod pass;
 pub mod registry;
 pub mod rolling;
 pub mod shear;
+pub mod simd;
 pub mod slider;
 #[cfg(test)]
 mod testing;

@@ -1,7 +1,9 @@
 //! What an observing contact pass collects: exact sums for stress and energies, maxima, samples of
 //! single contacts. Sums are exact, so that no order of ranks, threads or lists shows in them.
 
-use super::law::Energies;
+use super::geometry::PairTouch;
+use super::lane::{scale, sub};
+use super::law::{ContactResponse, Energies};
 use crate::exchange::exact_sum::ExactSum;
 
 /// Names the places in [`Observation::sums`].
@@ -63,8 +65,6 @@ pub struct Wanted {
     pub sums: bool,
     /// Every touching contact.
     pub samples: bool,
-    /// Ledger lines.
-    pub ledger: bool,
 }
 
 /// Collected by one pass over some contacts.
@@ -87,14 +87,10 @@ impl Observation {
         Self { sums: if wanted.sums { vec![ExactSum::new(); SUMS] } else { Vec::new() }, ..Self::default() }
     }
 
-    /// Take in one contact.
-    pub fn collect(&mut self, sample: &Sample, energies: &Energies<f64>, wanted: Wanted) {
-        if wanted.sums && sample.counted {
-            self.add_to_sums(sample, energies);
-        }
-        if wanted.samples {
-            self.samples.push(*sample);
-        }
+    /// Take in maxima.
+    pub fn raise(&mut self, stiffness: f64, overlap_ratio: f64) {
+        self.max_stiffness = self.max_stiffness.max(stiffness);
+        self.max_overlap_ratio = self.max_overlap_ratio.max(overlap_ratio);
     }
 
     fn add_to_sums(&mut self, sample: &Sample, energies: &Energies<f64>) {
@@ -135,8 +131,67 @@ impl Observation {
                 sum.merge(more);
             }
         }
-        self.max_stiffness = self.max_stiffness.max(other.max_stiffness);
-        self.max_overlap_ratio = self.max_overlap_ratio.max(other.max_overlap_ratio);
+        self.raise(other.max_stiffness, other.max_overlap_ratio);
         self.samples.append(&mut other.samples);
+    }
+}
+
+/// Where an observing pass is and what it collects.
+#[derive(Debug)]
+pub struct Observed<'a> {
+    /// What to collect.
+    pub wanted: Wanted,
+    /// Number of owned particles.
+    pub owned: usize,
+    /// Number of the present contact's output line.
+    pub line: usize,
+    /// Collected so far.
+    pub observation: Observation,
+    /// Per line, from number `first_line` on, the force on the first \[N\] and 1 if the contact touches, else 0;
+    /// may be empty.
+    pub forces: &'a mut [[f64; 4]],
+    /// Number of the first of `forces`.
+    pub first_line: usize,
+}
+
+impl Observed<'_> {
+    /// Single contacts are wanted, not only maxima over them.
+    #[must_use]
+    pub fn single(&self) -> bool {
+        self.wanted.sums || self.wanted.samples
+    }
+
+    /// The present contact does not touch.
+    pub fn no_touch(&mut self) {
+        if let Some(force) = self.forces.get_mut(self.line - self.first_line) {
+            *force = [0.0; 4];
+        }
+    }
+
+    /// Take in the present contact; `first` is the local index of its first particle.
+    pub fn touch(&mut self, first: usize, pair: &PairTouch<f64>, response: &ContactResponse<f64>, wall: Option<u32>) {
+        let touch = &pair.touch;
+        let force = sub(response.tangential_force, scale(touch.normal, response.normal_force));
+        if let Some(place) = self.forces.get_mut(self.line - self.first_line) {
+            *place = [force[0], force[1], force[2], 1.0];
+        }
+        let sample = Sample {
+            line: self.line,
+            branch: pair.branch,
+            normal: touch.normal,
+            overlap: touch.overlap,
+            force: scale(force, -1.0),
+            normal_force: response.normal_force,
+            arms: [pair.arm_first, pair.arm_second],
+            counted: first < self.owned,
+            wall: wall.map(|wall| wall as usize),
+        };
+        if self.wanted.sums && sample.counted {
+            self.observation.add_to_sums(&sample, &response.energies);
+        }
+        if self.wanted.samples {
+            self.observation.samples.push(sample);
+        }
+        self.observation.raise(response.stiffness, touch.overlap / pair.min_radius);
     }
 }

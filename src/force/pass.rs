@@ -1,69 +1,54 @@
-//! The loop around the laws, written once and monomorphised per composition: records in, one output
-//! line per contact out, memory updated in place.
+//! The loop around the laws, written once and monomorphised per composition and per width of the lanes:
+//! records in, one output line per contact out, memory updated in place.
 
 use super::composition::{self, MAX_MEMORY};
-use super::geometry::{self, CellMotion, PairTouch};
-use super::lane::{cross, dot, scale, sub};
-use super::law::{Column, ContactLaw, ContactResponse, LawVisitor, Touch};
-use super::observe::{CONTACT_LEDGER, Observation, Sample, Wanted};
+use super::geometry::{self, Bodies, CellMotion, PairTouch};
+use super::lane::{Lane, cross, dot, scale, sub};
+use super::law::{Column, ContactLaw, LawVisitor, Touch};
+use super::observe::Observed;
+use super::simd::Simd;
 use crate::config::PairConfig;
-use crate::contact::list::{BLOCK, Partners, Section};
+use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
+use std::ops::Range;
 
-/// Contacts that one thread takes at least.
-const GRAIN: usize = 2048;
+/// Numbers at the end of an output line that the energy ledger takes.
+pub const LEDGER_STRIDE: usize = 8;
 
-/// What the pass reads beside the section itself.
+/// How many blocks ahead records are asked for.
+const PREFETCH: usize = 6;
+
+/// What all passes of a step share.
 #[derive(Debug, Clone, Copy)]
 pub struct PassInput<'a> {
-    /// Records of owned particles and ghosts.
-    pub records: &'a [Record],
-    /// Number of owned particles.
-    pub owned: usize,
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments).
+    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), then the ledger's.
     pub stride: usize,
+    /// Write the ledger's numbers.
+    pub ledger: bool,
     /// Largest allowed overlap over the smaller radius.
     pub max_overlap_fraction: f64,
     /// Time since the last evaluation \[s\].
     pub time_step: f64,
-    /// What to observe; `None`: the plain pass.
-    pub wanted: Option<Wanted>,
-    /// Split the work over the threads of the current pool.
-    pub parallel: bool,
+    /// Instructions to use.
+    pub simd: Simd,
 }
 
-/// What the pass writes for a section.
+/// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
-pub struct PassOutput<'a> {
-    /// Output lines of the section, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F
-    /// the force on the first.
-    pub lines: &'a mut [f64],
-    /// Ledger lines, [`CONTACT_LEDGER`] numbers each; empty unless wanted.
-    pub ledger: &'a mut [f64],
+pub struct LineRing<'a> {
+    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; then
+    /// the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
+    pub values: &'a mut [f64],
+    /// Number of the first block's first line.
+    pub first: usize,
+    /// Capacity less one, all ones in binary; `usize::MAX` for a buffer that never wraps.
+    pub mask: usize,
 }
 
-/// What a pass brings back.
-#[derive(Debug, Default)]
-pub struct PassResult {
-    /// Observation, if wanted.
-    pub observation: Option<Observation>,
-    /// Place and overlap ratio of a contact that overlaps too much or is not a number.
-    pub fault: Option<(usize, f64)>,
-}
-
-impl PassResult {
-    fn merge(mut self, other: Self) -> Self {
-        match (&mut self.observation, other.observation) {
-            (Some(mine), Some(theirs)) => mine.merge(theirs),
-            (mine @ None, theirs) => *mine = theirs,
-            _ => {}
-        }
-        self.fault = self.fault.or(other.fault);
-        self
-    }
-}
+/// A contact that overlaps too much or is not a number: its place in the section and overlap ratio.
+pub type Excess = Option<(usize, f64)>;
 
 /// The pass of one pair of materials.
 pub trait PairPass: Send + Sync {
@@ -75,8 +60,25 @@ pub trait PairPass: Send + Sync {
     fn stride(&self) -> usize;
     /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
     fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
-    /// Evaluate all contacts of a section.
-    fn run(&self, input: &PassInput, section: &mut Section, output: PassOutput) -> PassResult;
+    /// Evaluate some blocks of a section: forces to `lines`, memory moved on by one step. `records` start at the
+    /// section's origin.
+    fn run(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess;
+    /// Look at some blocks of a section without changing anything.
+    fn observe(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &Section,
+        blocks: Range<usize>,
+        observed: &mut Observed,
+    );
 }
 
 struct LawPass<C> {
@@ -96,18 +98,6 @@ impl LawVisitor for Builder {
 #[must_use]
 pub fn build(pair: &PairConfig) -> Box<dyn PairPass> {
     composition::visit(pair, Builder)
-}
-
-/// A run of whole blocks of a section, so that threads can share one.
-struct Slice<'a> {
-    place: usize,
-    count: usize,
-    first: &'a [u32],
-    second: &'a [u32],
-    shift: &'a [u16],
-    memory: &'a mut [f64],
-    lines: &'a mut [f64],
-    ledger: &'a mut [f64],
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
@@ -142,167 +132,282 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
     }
 
-    fn run(&self, input: &PassInput, section: &mut Section, output: PassOutput) -> PassResult {
-        let slice = Slice {
-            place: 0,
-            count: section.count,
-            first: &section.first,
-            second: &section.second,
-            shift: &section.shift,
-            memory: &mut section.memory,
-            lines: output.lines,
-            ledger: output.ledger,
-        };
-        let (base, partners) = (section.base, section.partners);
-        match (input.wanted.is_some(), partners == Partners::Wall) {
-            (false, false) => self.split::<false, false>(input, base, slice),
-            (false, true) => self.split::<false, true>(input, base, slice),
-            (true, false) => self.split::<true, false>(input, base, slice),
-            (true, true) => self.split::<true, true>(input, base, slice),
+    fn run(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess {
+        if section.partners == Partners::Wall {
+            return self.walls(input, records, section, blocks, lines);
+        }
+        match (input.simd, input.ledger) {
+            (Simd::Scalar, false) => self.spheres::<f64, false>(input, records, section, blocks, lines),
+            (Simd::Scalar, true) => self.spheres::<f64, true>(input, records, section, blocks, lines),
+            // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+            #[cfg(target_arch = "x86_64")]
+            (Simd::Avx2, false) => unsafe { self.spheres_avx2::<false>(input, records, section, blocks, lines) },
+            #[cfg(target_arch = "x86_64")]
+            (Simd::Avx2, true) => unsafe { self.spheres_avx2::<true>(input, records, section, blocks, lines) },
+            #[cfg(target_arch = "x86_64")]
+            (Simd::Avx512, false) => unsafe { self.spheres_avx512::<false>(input, records, section, blocks, lines) },
+            #[cfg(target_arch = "x86_64")]
+            (Simd::Avx512, true) => unsafe { self.spheres_avx512::<true>(input, records, section, blocks, lines) },
+            #[cfg(not(target_arch = "x86_64"))]
+            (_, false) => self.spheres::<f64, false>(input, records, section, blocks, lines),
+            #[cfg(not(target_arch = "x86_64"))]
+            (_, true) => self.spheres::<f64, true>(input, records, section, blocks, lines),
+        }
+    }
+
+    fn observe(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &Section,
+        blocks: Range<usize>,
+        observed: &mut Observed,
+    ) {
+        if !observed.single() && section.partners != Partners::Wall {
+            let [stiffness, ratio] = match input.simd {
+                // SAFETY: as in `run`.
+                #[cfg(target_arch = "x86_64")]
+                Simd::Avx2 => unsafe { self.peaks_avx2(input, records, section, blocks) },
+                #[cfg(target_arch = "x86_64")]
+                Simd::Avx512 => unsafe { self.peaks_avx512(input, records, section, blocks) },
+                _ => self.peaks::<f64>(input, records, section, blocks),
+            };
+            observed.observation.raise(stiffness, ratio);
+            return;
+        }
+        let line = observed.line;
+        for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
+            observed.line = line + place - blocks.start * BLOCK;
+            self.observe_one(input, records, section, place, observed);
         }
     }
 }
 
 impl<C: ContactLaw> LawPass<C> {
-    fn split<const OBSERVE: bool, const WALL: bool>(&self, input: &PassInput, base: usize, slice: Slice) -> PassResult {
-        if !input.parallel || slice.count <= GRAIN {
-            return self.contacts::<OBSERVE, WALL>(input, base, slice);
-        }
-        let middle = (slice.count / 2).next_multiple_of(BLOCK);
-        let (first_low, first_high) = slice.first.split_at(middle);
-        let (second_low, second_high) = slice.second.split_at(middle);
-        let (shift_low, shift_high) = slice.shift.split_at(middle);
-        let (memory_low, memory_high) = slice.memory.split_at_mut(middle * C::MEMORY);
-        let (lines_low, lines_high) = slice.lines.split_at_mut(middle * input.stride);
-        let cut = if slice.ledger.is_empty() { 0 } else { middle * CONTACT_LEDGER };
-        let (ledger_low, ledger_high) = slice.ledger.split_at_mut(cut);
-        let low = Slice {
-            place: slice.place,
-            count: middle,
-            first: first_low,
-            second: second_low,
-            shift: shift_low,
-            memory: memory_low,
-            lines: lines_low,
-            ledger: ledger_low,
-        };
-        let high = Slice {
-            place: slice.place + middle,
-            count: slice.count - middle,
-            first: first_high,
-            second: second_high,
-            shift: shift_high,
-            memory: memory_high,
-            lines: lines_high,
-            ledger: ledger_high,
-        };
-        let (a, b) = rayon::join(
-            || self.split::<OBSERVE, WALL>(input, base, low),
-            || self.split::<OBSERVE, WALL>(input, base, high),
-        );
-        a.merge(b)
-    }
-
-    fn contacts<const OBSERVE: bool, const WALL: bool>(
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn spheres_avx2<const LEDGER: bool>(
         &self,
         input: &PassInput,
-        base: usize,
-        slice: Slice,
-    ) -> PassResult {
-        let mut result = PassResult::default();
-        let wanted = input.wanted.unwrap_or_default();
-        let mut observation = Observation::new(wanted);
-        // Outside the loop: only the law's own columns are ever set.
-        let mut memory = [0.0; MAX_MEMORY];
-        for place in 0..slice.count {
-            let line = &mut slice.lines[place * input.stride..(place + 1) * input.stride];
-            let start = place / BLOCK * BLOCK * C::MEMORY + place % BLOCK;
-            let a = &input.records[slice.first[place] as usize];
-            let touching = if WALL {
-                geometry::wall(a, slice.second[place], input.motion)
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess {
+        self.spheres::<super::lane::avx2::F64x4, LEDGER>(input, records, section, blocks, lines)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    fn spheres_avx512<const LEDGER: bool>(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess {
+        self.spheres::<super::lane::avx512::F64x8, LEDGER>(input, records, section, blocks, lines)
+    }
+
+    #[inline(always)]
+    fn spheres<L: Lane, const LEDGER: bool>(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess {
+        let mut excess = None;
+        let limit = L::splat(input.max_overlap_fraction);
+        let last = section.first.len();
+        for block in blocks.clone() {
+            let slot = (lines.first + (block - blocks.start) * BLOCK) & lines.mask;
+            let rows = &mut lines.values[slot * input.stride..(slot + BLOCK) * input.stride];
+            let memory = &mut section.memory[block * C::MEMORY..(block + 1) * C::MEMORY];
+            for part in 0..BLOCK / L::WIDTH {
+                let (lane, place) = (part * L::WIDTH, block * BLOCK + part * L::WIDTH);
+                let ahead = place + PREFETCH * BLOCK;
+                if ahead + L::WIDTH <= last {
+                    L::prefetch(records, &section.first[ahead..ahead + L::WIDTH]);
+                    L::prefetch(records, &section.second[ahead..ahead + L::WIDTH]);
+                }
+                let a = Bodies::<L>::gather(records, &section.first[place..place + L::WIDTH]);
+                let b = Bodies::<L>::gather(records, &section.second[place..place + L::WIDTH]);
+                let pair = geometry::spheres(&a, &b, &section.shift[place..place + L::WIDTH], input.motion);
+                let rows = &mut rows[lane * input.stride..(lane + L::WIDTH) * input.stride];
+                self.contacts::<L, LEDGER>(input, &pair, memory, lane, rows, false);
+                // Written so that NaN counts as a fault.
+                let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
+                if excess.is_none() && L::any(pair.touching & !within) {
+                    excess = first_excess(&pair, input.max_overlap_fraction, place);
+                }
+            }
+        }
+        excess
+    }
+
+    fn walls(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &mut Section,
+        blocks: Range<usize>,
+        lines: LineRing,
+    ) -> Excess {
+        let mut excess = None;
+        for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
+            let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
+            let rows = &mut lines.values[slot * input.stride..(slot + 1) * input.stride];
+            let start = place / BLOCK * C::MEMORY;
+            let memory = &mut section.memory[start..start + C::MEMORY];
+            let pair = geometry::wall(&records[section.first[place] as usize], section.second[place], input.motion);
+            if input.ledger {
+                self.contacts::<f64, true>(input, &pair, memory, place % BLOCK, rows, true);
             } else {
-                let b = &input.records[slice.second[place] as usize];
-                geometry::spheres(a, b, slice.shift[place], input.motion)
-            };
-            let Some(pair) = touching else {
-                line.fill(0.0);
-                for column in 0..C::MEMORY {
-                    slice.memory[start + column * BLOCK] = 0.0;
-                }
-                if OBSERVE && wanted.ledger {
-                    slice.ledger[place * CONTACT_LEDGER..(place + 1) * CONTACT_LEDGER].fill(0.0);
-                }
-                continue;
-            };
-            // Written so that NaN counts as a fault.
-            let within = pair.touch.overlap <= input.max_overlap_fraction * pair.min_radius;
-            if !within && result.fault.is_none() {
-                result.fault = Some((slice.place + place, pair.touch.overlap / pair.min_radius));
+                self.contacts::<f64, false>(input, &pair, memory, place % BLOCK, rows, true);
             }
-            for (column, value) in memory[..C::MEMORY].iter_mut().enumerate() {
-                *value = slice.memory[start + column * BLOCK];
-            }
-            let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
-            for (column, value) in memory[..C::MEMORY].iter().enumerate() {
-                slice.memory[start + column * BLOCK] = *value;
-            }
-            let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
-            write_line(line, &pair, &response, force);
-            if OBSERVE {
-                if wanted.ledger {
-                    let entry = &mut slice.ledger[place * CONTACT_LEDGER..(place + 1) * CONTACT_LEDGER];
-                    write_ledger(entry, &pair, &response, force, input.time_step, WALL);
-                }
-                let sample = Sample {
-                    line: base + slice.place + place,
-                    branch: pair.branch,
-                    normal: pair.touch.normal,
-                    overlap: pair.touch.overlap,
-                    force: scale(force, -1.0),
-                    normal_force: response.normal_force,
-                    arms: [pair.arm_first, pair.arm_second],
-                    counted: (slice.first[place] as usize) < input.owned,
-                    wall: if WALL { Some(slice.second[place] as usize) } else { None },
-                };
-                observation.collect(&sample, &response.energies, wanted);
-                observation.max_stiffness = observation.max_stiffness.max(response.stiffness);
-                observation.max_overlap_ratio = observation.max_overlap_ratio.max(pair.touch.overlap / pair.min_radius);
-            }
+            excess = excess.or_else(|| first_excess(&pair, input.max_overlap_fraction, place));
         }
-        if OBSERVE {
-            result.observation = Some(observation);
+        excess
+    }
+
+    /// Law and output of `L::WIDTH` contacts that begin at `lane` of their block.
+    #[inline(always)]
+    fn contacts<L: Lane, const LEDGER: bool>(
+        &self,
+        input: &PassInput,
+        pair: &PairTouch<L>,
+        memory: &mut [CacheLine],
+        lane: usize,
+        rows: &mut [f64],
+        wall: bool,
+    ) {
+        let zero = L::splat(0.0);
+        if !L::any(pair.touching) {
+            rows.fill(0.0);
+            for column in memory {
+                zero.store(&mut column.0[lane..]);
+            }
+            return;
         }
-        result
+        let mut values = [zero; MAX_MEMORY];
+        let memory = &mut memory[..C::MEMORY];
+        for column in 0..C::MEMORY {
+            values[column] = L::load(&memory[column].0[lane..]);
+        }
+        let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
+        let kept = |value: L| L::select(pair.touching, value, zero);
+        for column in 0..C::MEMORY {
+            kept(values[column]).store(&mut memory[column].0[lane..]);
+        }
+        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
+        let stride = input.stride;
+        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
+        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
+        if own >= 8 {
+            let turning = cross(pair.touch.normal, response.tangential_force);
+            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
+        }
+        if own >= 12 {
+            let moment = response.moment;
+            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
+        }
+        if LEDGER {
+            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
+            let work = kept(dot(force, pair.imposed_velocity) * L::splat(input.time_step));
+            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
+            let e = &response.energies;
+            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
+            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn peaks_avx2(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
+        self.peaks::<super::lane::avx2::F64x4>(input, records, section, blocks)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    fn peaks_avx512(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
+        self.peaks::<super::lane::avx512::F64x8>(input, records, section, blocks)
+    }
+
+    /// Largest tangent stiffness and largest overlap over the smaller radius.
+    #[inline(always)]
+    fn peaks<L: Lane>(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &Section,
+        blocks: Range<usize>,
+    ) -> [f64; 2] {
+        let zero = L::splat(0.0);
+        let (mut stiffness, mut ratio) = (zero, zero);
+        for place in (blocks.start * BLOCK..blocks.end * BLOCK).step_by(L::WIDTH) {
+            let lanes = place..place + L::WIDTH;
+            let a = Bodies::<L>::gather(records, &section.first[lanes.clone()]);
+            let b = Bodies::<L>::gather(records, &section.second[lanes.clone()]);
+            let pair = geometry::spheres(&a, &b, &section.shift[lanes], input.motion);
+            let mut values = [zero; MAX_MEMORY];
+            let memory = &section.memory[place / BLOCK * C::MEMORY..(place / BLOCK + 1) * C::MEMORY];
+            for column in 0..C::MEMORY {
+                values[column] = L::load(&memory[column].0[place % BLOCK..]);
+            }
+            let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
+            stiffness = L::select(pair.touching, response.stiffness, zero).max(stiffness);
+            ratio = L::select(pair.touching, pair.touch.overlap / pair.min_radius, zero).max(ratio);
+        }
+        let mut lanes = [0.0; 2 * BLOCK];
+        stiffness.store(&mut lanes);
+        ratio.store(&mut lanes[BLOCK..]);
+        let largest = |values: &[f64]| values.iter().fold(0.0, |m, v| if *v > m { *v } else { m });
+        [largest(&lanes[..BLOCK]), largest(&lanes[BLOCK..])]
+    }
+
+    fn observe_one(
+        &self,
+        input: &PassInput,
+        records: &[Record],
+        section: &Section,
+        place: usize,
+        observed: &mut Observed,
+    ) {
+        let first = &section.first[place..=place];
+        let wall = (section.partners == Partners::Wall).then(|| section.second[place]);
+        let pair = if let Some(wall) = wall {
+            geometry::wall(&records[first[0] as usize], wall, input.motion)
+        } else {
+            let (a, b) = (Bodies::gather(records, first), Bodies::gather(records, &section.second[place..=place]));
+            geometry::spheres(&a, &b, &section.shift[place..=place], input.motion)
+        };
+        if !pair.touching {
+            observed.no_touch();
+            return;
+        }
+        let mut memory = [0.0; MAX_MEMORY];
+        section.read_memory(place, &mut memory);
+        let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
+        observed.touch(section.origin + first[0] as usize, &pair, &response, wall);
     }
 }
 
-#[inline(always)]
-fn write_line(line: &mut [f64], pair: &PairTouch, response: &ContactResponse<f64>, force: [f64; 3]) {
-    line[..3].copy_from_slice(&force);
-    line[3] = pair.arm_first;
-    if line.len() >= 8 {
-        line[4..7].copy_from_slice(&cross(pair.touch.normal, response.tangential_force));
-        line[7] = pair.arm_second;
-    }
-    if line.len() >= 12 {
-        line[8..11].copy_from_slice(&response.moment);
-        line[11] = 0.0;
-    }
-}
-
-/// Energies that pass through one contact in one step \[J\]. The cell puts in `−F_second · v_imposed Δt`;
-/// at a moving wall the same work is the wall's.
-#[inline(always)]
-fn write_ledger(
-    entry: &mut [f64],
-    pair: &PairTouch,
-    response: &ContactResponse<f64>,
-    force: [f64; 3],
-    time_step: f64,
-    wall: bool,
-) {
-    let work = dot(force, pair.imposed_velocity) * time_step;
-    let e = &response.energies;
-    let (cell, driven) = if wall { (0.0, work) } else { (work, 0.0) };
-    entry.copy_from_slice(&[cell, driven, e.damping, e.viscous, e.friction, e.plastic]);
+/// The first lane that overlaps too much or is not a number.
+#[cold]
+fn first_excess<L: Lane>(pair: &PairTouch<L>, limit: f64, place: usize) -> Excess {
+    let (mut overlap, mut radius) = ([0.0; BLOCK], [0.0; BLOCK]);
+    pair.touch.overlap.store(&mut overlap);
+    pair.min_radius.store(&mut radius);
+    let beyond = |lane: &usize| L::lane(pair.touching, *lane) && !(overlap[*lane] <= limit * radius[*lane]);
+    (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlap[lane] / radius[lane]))
 }

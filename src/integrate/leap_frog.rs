@@ -4,12 +4,11 @@
 //! half the old one and (2.4) half the new one.
 
 use super::gather::Lines;
-use crate::contact::list::ContactList;
+use crate::contact::list::End;
+use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, Record, synchronised};
-
-/// Particles that one thread takes at least.
-const GRAIN: usize = 1024;
+use std::ops::Range;
 
 /// What is the same for all particles in one step.
 #[derive(Debug, Clone, Copy)]
@@ -34,8 +33,10 @@ pub struct StepMotion {
     pub rotation: bool,
     /// Keep the energy ledger.
     pub ledger: bool,
-    /// Split the work over the threads of the current pool.
-    pub parallel: bool,
+    /// Follow orientations.
+    pub orientation: bool,
+    /// Instructions to use.
+    pub simd: Simd,
 }
 
 /// What a step brings back.
@@ -51,135 +52,179 @@ pub struct StepResult {
 }
 
 impl StepResult {
-    fn merge(mut self, mut other: Self) -> Self {
+    /// Join with what other particles brought.
+    pub fn absorb(&mut self, mut other: Self) {
         if other.max_displacement_squared > self.max_displacement_squared {
             self.max_displacement_squared = other.max_displacement_squared;
         }
         self.wrapped.append(&mut other.wrapped);
         self.lost = self.lost.or(other.lost);
-        self
     }
 }
 
 /// Owned particles `start ..` as slices that threads can split.
-struct Slice<'a> {
-    start: usize,
-    record: &'a mut [Record],
+#[derive(Debug)]
+pub struct Slice<'a> {
+    /// Local index of the first.
+    pub start: usize,
+    /// Their records.
+    pub record: &'a mut [Record],
     image: &'a mut [[i32; 3]],
     velocity: &'a mut [[f64; 3]],
-    acceleration: &'a mut [[f64; 3]],
     spin: &'a mut [[f64; 3]],
-    angular_acceleration: &'a mut [[f64; 3]],
     orientation: &'a mut [[f64; 4]],
     ledger: &'a mut [[f64; LEDGER.len()]],
     reference: &'a [[f64; 3]],
-    reference_shift: &'a mut [[i32; 3]],
+    crossed: &'a mut [[i8; 4]],
 }
 
-impl Slice<'_> {
-    fn split(self, middle: usize) -> (Self, Self) {
-        let (record, record_high) = self.record.split_at_mut(middle);
-        let (image, image_high) = self.image.split_at_mut(middle);
-        let (velocity, velocity_high) = self.velocity.split_at_mut(middle);
-        let (acceleration, acceleration_high) = self.acceleration.split_at_mut(middle);
-        let (spin, spin_high) = self.spin.split_at_mut(middle);
-        let (angular_acceleration, angular_high) = self.angular_acceleration.split_at_mut(middle);
-        let (orientation, orientation_high) = self.orientation.split_at_mut(middle);
-        let (ledger, ledger_high) = self.ledger.split_at_mut(middle);
-        let (reference, reference_high) = self.reference.split_at(middle);
-        let (reference_shift, shift_high) = self.reference_shift.split_at_mut(middle);
-        let low = Slice {
-            start: self.start,
-            record,
-            image,
-            velocity,
-            acceleration,
-            spin,
-            angular_acceleration,
-            orientation,
-            ledger,
-            reference,
-            reference_shift,
-        };
-        let high = Slice {
-            start: self.start + middle,
+impl<'a> Slice<'a> {
+    /// All owned particles.
+    pub fn new(particles: &'a mut Particles, reference: &'a mut Reference) -> Self {
+        let owned = particles.owned;
+        Self {
+            start: 0,
+            record: &mut particles.record[..owned],
+            image: &mut particles.image[..owned],
+            velocity: &mut particles.velocity,
+            spin: &mut particles.spin,
+            orientation: &mut particles.orientation,
+            ledger: &mut particles.ledger,
+            reference: &reference.position,
+            crossed: &mut reference.crossed[..owned],
+        }
+    }
+
+    /// The first `count` particles and the others.
+    #[must_use]
+    pub fn split(self, count: usize) -> (Self, Self) {
+        let (record, record_high) = self.record.split_at_mut(count);
+        let (image, image_high) = self.image.split_at_mut(count);
+        let (velocity, velocity_high) = self.velocity.split_at_mut(count);
+        let (spin, spin_high) = self.spin.split_at_mut(count);
+        let (orientation, orientation_high) = self.orientation.split_at_mut(count.min(self.orientation.len()));
+        let (ledger, ledger_high) = self.ledger.split_at_mut(count.min(self.ledger.len()));
+        let (reference, reference_high) = self.reference.split_at(count);
+        let (crossed, crossed_high) = self.crossed.split_at_mut(count);
+        let low = Self { start: self.start, record, image, velocity, spin, orientation, ledger, reference, crossed };
+        let high = Self {
+            start: self.start + count,
             record: record_high,
             image: image_high,
             velocity: velocity_high,
-            acceleration: acceleration_high,
             spin: spin_high,
-            angular_acceleration: angular_high,
             orientation: orientation_high,
             ledger: ledger_high,
             reference: reference_high,
-            reference_shift: shift_high,
+            crossed: crossed_high,
         };
         (low, high)
     }
 }
 
-/// Positions at the last list rebuild and the images crossed since.
+/// Positions at the last list rebuild and the images crossed since the last Verlet list.
 #[derive(Debug, Clone, Default)]
 pub struct Reference {
-    /// Positions then \[m\].
+    /// Positions then, unwrapped back to the last Verlet list \[m\].
     pub position: Vec<[f64; 3]>,
-    /// Images crossed since then.
-    pub crossed: Vec<[i32; 3]>,
+    /// Images crossed since the last Verlet list, of owned particles and ghosts; the fourth is 0.
+    pub crossed: Vec<[i8; 4]>,
 }
 
 impl Reference {
-    /// Take the present positions of the owned particles.
-    pub fn take(&mut self, particles: &Particles) {
-        self.position.clear();
-        self.position.extend(particles.record[..particles.owned].iter().map(|r| r.position));
+    /// Nobody has crossed anything: there is a new Verlet list.
+    pub fn reset(&mut self, particles: &Particles) {
         self.crossed.clear();
-        self.crossed.resize(particles.owned, [0; 3]);
+        self.crossed.resize(particles.len(), [0; 4]);
+    }
+
+    /// Take the present positions of the owned particles.
+    pub fn take(&mut self, particles: &Particles, sides: [f64; 3]) {
+        let now = particles.record[..particles.owned].iter().zip(&self.crossed);
+        self.position.clear();
+        self.position
+            .extend(now.map(|(r, crossed)| [0, 1, 2].map(|k| r.position[k] + f64::from(crossed[k]) * sides[k])));
+    }
+
+    /// A particle crossed periodic faces.
+    pub fn cross(&mut self, particle: usize, wraps: [i32; 3]) {
+        cross(&mut self.crossed[particle], wraps);
     }
 }
 
-/// Sum the forces on all owned particles and move them one step.
+fn cross(crossed: &mut [i8; 4], wraps: [i32; 3]) {
+    for (count, wrap) in crossed.iter_mut().zip(wraps) {
+        *count += wrap as i8;
+    }
+}
+
+/// Sum the forces on some particles of a slice and move them one step. `ends` and `offsets` are those of the
+/// contact list.
 pub fn advance(
-    particles: &mut Particles,
-    reference: &mut Reference,
-    list: &ContactList,
+    slice: &mut Slice,
+    range: Range<usize>,
+    offsets: &[u32],
+    ends: &[End],
     lines: &Lines,
     motion: &StepMotion,
-) -> StepResult {
-    let owned = particles.owned;
-    let slice = Slice {
-        start: 0,
-        record: &mut particles.record[..owned],
-        image: &mut particles.image[..owned],
-        velocity: &mut particles.velocity,
-        acceleration: &mut particles.acceleration,
-        spin: &mut particles.spin,
-        angular_acceleration: &mut particles.angular_acceleration,
-        orientation: &mut particles.orientation,
-        ledger: &mut particles.ledger,
-        reference: &reference.position,
-        reference_shift: &mut reference.crossed,
-    };
-    split(slice, list, lines, motion)
-}
-
-fn split(slice: Slice, list: &ContactList, lines: &Lines, motion: &StepMotion) -> StepResult {
-    let count = slice.record.len();
-    if !motion.parallel || count <= GRAIN {
-        return advance_slice(slice, list, lines, motion);
+    result: &mut StepResult,
+) {
+    match motion.simd {
+        // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2 => unsafe { advance_avx2(slice, range, offsets, ends, lines, motion, result) },
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx512 => unsafe { advance_avx512(slice, range, offsets, ends, lines, motion, result) },
+        _ => advance_range(slice, range, offsets, ends, lines, motion, result),
     }
-    let (low, high) = slice.split(count / 2);
-    let (a, b) = rayon::join(|| split(low, list, lines, motion), || split(high, list, lines, motion));
-    a.merge(b)
 }
 
-fn advance_slice(mut slice: Slice, list: &ContactList, lines: &Lines, motion: &StepMotion) -> StepResult {
-    let mut result = StepResult::default();
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn advance_avx2(
+    slice: &mut Slice,
+    range: Range<usize>,
+    offsets: &[u32],
+    ends: &[End],
+    lines: &Lines,
+    motion: &StepMotion,
+    result: &mut StepResult,
+) {
+    advance_range(slice, range, offsets, ends, lines, motion, result);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl")]
+fn advance_avx512(
+    slice: &mut Slice,
+    range: Range<usize>,
+    offsets: &[u32],
+    ends: &[End],
+    lines: &Lines,
+    motion: &StepMotion,
+    result: &mut StepResult,
+) {
+    advance_range(slice, range, offsets, ends, lines, motion, result);
+}
+
+#[inline(always)]
+fn advance_range(
+    slice: &mut Slice,
+    range: Range<usize>,
+    offsets: &[u32],
+    ends: &[End],
+    lines: &Lines,
+    motion: &StepMotion,
+    result: &mut StepResult,
+) {
     let (old, new) = (motion.previous_time_step, motion.time_step);
     let kick = 0.5 * (old + new);
     let drift = [0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new);
     let stretch = [0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]);
-    for index in 0..slice.record.len() {
-        let load = lines.load_on(list, slice.start + index);
+    for index in range {
+        let particle = slice.start + index;
+        let ends = &ends[offsets[particle] as usize..offsets[particle + 1] as usize];
+        let load = lines.load(ends);
         let record = &mut slice.record[index];
         let free = record.inverse_mass > 0.0;
         let mut acceleration = load.force.map(|f| f * record.inverse_mass);
@@ -189,10 +234,9 @@ fn advance_slice(mut slice: Slice, list: &ContactList, lines: &Lines, motion: &S
             }
         }
         if motion.ledger {
-            lines.add_ledger(list, slice.start + index, &mut slice.ledger[index]);
+            lines.add_ledger(ends, &mut slice.ledger[index]);
             add_external_work(&mut slice.ledger[index], record, load.force, load.torque, motion, free);
         }
-        slice.acceleration[index] = acceleration;
         let velocity = &mut slice.velocity[index];
         for k in 0..3 {
             velocity[k] += kick * acceleration[k];
@@ -201,20 +245,21 @@ fn advance_slice(mut slice: Slice, list: &ContactList, lines: &Lines, motion: &S
         if motion.rotation {
             let inverse_inertia = 2.5 * record.inverse_mass / (record.radius * record.radius);
             let angular = load.torque.map(|t| t * inverse_inertia);
-            slice.angular_acceleration[index] = angular;
             let spin = &mut slice.spin[index];
             for k in 0..3 {
                 spin[k] += kick * angular[k];
             }
-            slice.orientation[index] = turned(slice.orientation[index], *spin, new);
             record.spin = synchronised(*spin, angular, new);
+            if motion.orientation {
+                slice.orientation[index] = turned(slice.orientation[index], *spin, new);
+            }
         }
-        wrap(&mut slice, index, motion, &mut result);
+        wrap(slice, index, motion, result);
         let record = &mut slice.record[index];
         record.velocity = synchronised(slice.velocity[index], acceleration, new);
         let mut squared = 0.0;
         for k in 0..3 {
-            let unwrapped = record.position[k] + f64::from(slice.reference_shift[index][k]) * motion.sides[k];
+            let unwrapped = record.position[k] + f64::from(slice.crossed[index][k]) * motion.sides[k];
             let moved = unwrapped - stretch[k] * slice.reference[index][k];
             squared += moved * moved;
         }
@@ -222,10 +267,9 @@ fn advance_slice(mut slice: Slice, list: &ContactList, lines: &Lines, motion: &S
             result.max_displacement_squared = squared;
         }
         if squared.is_nan() {
-            result.lost = Some((slice.start + index) as u32);
+            result.lost = Some(particle as u32);
         }
     }
-    result
 }
 
 /// Bring a particle back into the cell, count the images, and change its velocity with the face (BC).
@@ -255,8 +299,8 @@ fn wrap(slice: &mut Slice, index: usize, motion: &StepMotion, result: &mut StepR
     if wraps != [0; 3] {
         for k in 0..3 {
             slice.image[index][k] += wraps[k];
-            slice.reference_shift[index][k] += wraps[k];
         }
+        cross(&mut slice.crossed[index], wraps);
         result.wrapped.push(((slice.start + index) as u32, wraps));
     }
 }

@@ -1,21 +1,29 @@
-//! The Verlet list: all pairs nearer than the sum of their radii plus the skin, each once, oriented
-//! from the lower global id, with every periodic image and own images.
+//! The Verlet list: all pairs nearer than the sum of their radii plus the skin, each once, with every
+//! periodic image and own images, listed with their owner: the particle with the lower local index.
 
 use super::cells::Bins;
-use crate::contact::shift::lexicographically_positive;
+use crate::contact::shift::{encode, lexicographically_positive};
 use crate::state::particles::Particles;
 use rayon::prelude::*;
 
-/// A pair that may come to touch. The shift counts from the unwrapped positions, so that wraps do not
-/// change it: the shift of the wrapped positions is `shift + image[second] − image[first]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Candidate {
-    /// Local index of the particle with the lower id.
-    pub first: u32,
-    /// Local index of the other.
-    pub second: u32,
-    /// Image shift of the second in unwrapped coordinates.
-    pub shift: [i32; 3],
+/// Pairs that may come to touch, by owner. The shifts are those of the positions when the list was made;
+/// what particles cross after that comes on top.
+#[derive(Debug, Clone, Default)]
+pub struct Candidates {
+    /// `offsets[p]..offsets[p+1]` are those of owned particle `p`.
+    pub offsets: Vec<u32>,
+    /// Local index of the partner.
+    pub partner: Vec<u32>,
+    /// Packed shift of the particle with the higher global id, seen from the other, in the lowest nine bits;
+    /// the bits above belong to who lists contacts.
+    pub code: Vec<u32>,
+}
+
+impl Candidates {
+    /// Set if the partner has the lower global id.
+    pub const PARTNER_FIRST: u32 = 1 << 9;
+    /// First bit that is free.
+    pub const FREE_BIT: u32 = 10;
 }
 
 /// Box and reach of a search.
@@ -94,64 +102,68 @@ impl Region {
     /// The Verlet list of this rank: every pair with at least one owned particle, once. Pairs of two
     /// driven particles are left out.
     #[must_use]
-    pub fn candidates(&self, particles: &Particles) -> Vec<Candidate> {
-        if particles.owned == 0 {
-            return Vec::new();
+    pub fn candidates(&self, particles: &Particles) -> Candidates {
+        const GRAIN: usize = 1024;
+        let owned = particles.owned;
+        let mut candidates = Candidates { offsets: vec![0], ..Candidates::default() };
+        if owned == 0 {
+            return candidates;
         }
         let points = self.points(particles);
         let reach = 2.0 * self.max_radius + self.skin;
         let low = [0, 1, 2].map(|k| self.low[k] - reach);
         let high = [0, 1, 2].map(|k| self.high[k] + reach);
         let bins = Bins::new(low, high, reach, &points.position);
-        let per_chunk: Vec<Vec<Candidate>> = (0..particles.owned.div_ceil(1024))
+        let parts: Vec<Candidates> = (0..owned.div_ceil(GRAIN))
             .into_par_iter()
-            .map(|chunk| {
-                let mut found = Vec::new();
-                let range = chunk * 1024..((chunk + 1) * 1024).min(particles.owned);
-                for first in range {
-                    self.candidates_of(first, particles, &points, &bins, &mut found);
+            .map(|part| {
+                let mut found = Candidates::default();
+                for owner in part * GRAIN..((part + 1) * GRAIN).min(owned) {
+                    self.candidates_of(owner, particles, &points, &bins, &mut found);
+                    found.offsets.push(found.partner.len() as u32);
                 }
                 found
             })
             .collect();
-        per_chunk.concat()
+        let total = parts.iter().map(|part| part.partner.len()).sum();
+        candidates.offsets.reserve(owned);
+        candidates.partner.reserve(total);
+        candidates.code.reserve(total);
+        for part in parts {
+            let before = candidates.partner.len() as u32;
+            candidates.offsets.extend(part.offsets.iter().map(|offset| before + offset));
+            candidates.partner.extend(part.partner);
+            candidates.code.extend(part.code);
+        }
+        candidates
     }
 
-    fn candidates_of(
-        &self,
-        owner: usize,
-        particles: &Particles,
-        points: &Points,
-        bins: &Bins,
-        found: &mut Vec<Candidate>,
-    ) {
+    fn candidates_of(&self, owner: usize, particles: &Particles, points: &Points, bins: &Bins, found: &mut Candidates) {
         let record = particles.record[owner];
         let id = particles.id[owner];
         bins.for_each_near(record.position, |point| {
-            let other = points.particle[point] as usize;
+            let partner = points.particle[point] as usize;
+            // Two owned particles meet twice, once from each side: keep the lower index's view.
+            if partner < owner {
+                return;
+            }
             let shift = points.shift[point];
-            let is_first = if other < particles.owned {
-                // Two owned particles meet twice, once from each side: keep the lower id's view.
-                if id > particles.id[other] || (id == particles.id[other] && !lexicographically_positive(shift)) {
-                    return;
-                }
-                true
-            } else {
-                id < particles.id[other]
-            };
-            let partner = &particles.record[other];
-            let sum = record.radius + partner.radius + self.skin;
+            if partner == owner && !lexicographically_positive(shift) {
+                return;
+            }
+            let other = &particles.record[partner];
+            let sum = record.radius + other.radius + self.skin;
             let d = [0, 1, 2].map(|k| points.position[point][k] - record.position[k]);
             if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] >= sum * sum
-                || (record.inverse_mass == 0.0 && partner.inverse_mass == 0.0)
+                || (record.inverse_mass == 0.0 && other.inverse_mass == 0.0)
             {
                 return;
             }
-            let unwrapped = [0, 1, 2].map(|k| shift[k] - particles.image[other][k] + particles.image[owner][k]);
-            found.push(if is_first {
-                Candidate { first: owner as u32, second: other as u32, shift: unwrapped }
+            found.partner.push(partner as u32);
+            found.code.push(if id <= particles.id[partner] {
+                u32::from(encode(shift))
             } else {
-                Candidate { first: other as u32, second: owner as u32, shift: unwrapped.map(|s| -s) }
+                u32::from(encode(shift.map(|s| -s))) | Candidates::PARTNER_FIRST
             });
         });
     }

@@ -16,7 +16,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Version of the format: raised when older programs could not read the file.
-const FORMAT: &str = "1";
+const FORMAT: &str = "2";
 
 /// The part of a checkpoint that one rank has read.
 #[derive(Debug, Clone, PartialEq)]
@@ -251,9 +251,9 @@ macro_rules! for_each_particle_field {
         $do!(position, f64, 3);
         $do!(radius, f64, 1);
         $do!(velocity, f64, 3);
-        $do!(acceleration, f64, 3);
+        $do!(full_velocity, f64, 3);
         $do!(spin, f64, 3);
-        $do!(angular_acceleration, f64, 3);
+        $do!(full_spin, f64, 3);
         $do!(orientation, f64, 4);
         $do!(ledger, f64, LEDGER.len());
         $do!(image, i32, 3);

@@ -105,10 +105,12 @@ fn table_row(row: &HistoryRow, done: f64) -> String {
 pub struct StageTimes {
     /// Neighbour lists, with re-sorting and migration.
     pub neighbours: f64,
-    /// Contact forces.
+    /// Contacts across periodic faces, strips and ranks, and with walls.
     pub contacts: f64,
-    /// Summing contact forces and moving particles.
-    pub gather_integrate: f64,
+    /// The other contacts, summing forces and moving particles.
+    pub step: f64,
+    /// Looks at the state: time step, load, reports.
+    pub observe: f64,
     /// Halo exchange: packing and waiting.
     pub halo: f64,
     /// Global sums and agreement.
@@ -120,24 +122,25 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    fn rows(&self) -> [(&'static str, f64); 7] {
+    fn rows(&self) -> [(&'static str, f64); 8] {
         let stages = [
             ("neighbours", self.neighbours),
-            ("contacts", self.contacts),
-            ("gather, integrate", self.gather_integrate),
+            ("border contacts", self.contacts),
+            ("contacts, motion", self.step),
+            ("observation", self.observe),
             ("halo", self.halo),
             ("reduce", self.reduce),
             ("output", self.output),
         ];
         let named: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
-        let [a, b, c, d, e, f] = stages;
-        [a, b, c, d, e, f, ("other", (self.total - named).max(0.0))]
+        let [a, b, c, d, e, f, g] = stages;
+        [a, b, c, d, e, f, g, ("other", (self.total - named).max(0.0))]
     }
 
     /// Work of this rank that does not wait for others: what imbalance is measured on \[s\].
     #[must_use]
     pub fn busy(&self) -> f64 {
-        self.neighbours + self.contacts + self.gather_integrate
+        self.neighbours + self.contacts + self.step
     }
 }
 
@@ -210,7 +213,7 @@ mod tests {
 
     #[test]
     fn cost_table_gives_shares_and_particle_steps_per_second() {
-        let times = StageTimes { contacts: 1.0, gather_integrate: 0.5, total: 2.0, ..StageTimes::default() };
+        let times = StageTimes { contacts: 1.0, step: 0.5, total: 2.0, ..StageTimes::default() };
         let size = RunSize { particles: 1_000, steps: 500, threads: 2, bytes: 400_000 };
         let text = cost_table(&Communicator::single(), &times, &size);
         let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap_or_default().to_owned();

@@ -42,6 +42,7 @@ pub fn config(species: Vec<Species>) -> Config {
             checkpoint_wall_time: None,
             checkpoints_kept: 2,
             energy_ledger: false,
+            orientations: false,
             plots: false,
         },
         parallel: ParallelConfig { grid: None, threads: None, skin: 0.1, min_particles_per_rank: 1 },

@@ -230,8 +230,8 @@ fn progress(config: &Config, global: &GlobalState) -> f64 {
 }
 
 fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {
-    let [neighbours, contacts, gather_integrate, halo, reduce, output] = timers.seconds();
-    StageTimes { neighbours, contacts, gather_integrate, halo, reduce, output, total: wall.as_secs_f64() }
+    let [neighbours, contacts, step, observe, halo, reduce, output] = timers.seconds();
+    StageTimes { neighbours, contacts, step, observe, halo, reduce, output, total: wall.as_secs_f64() }
 }
 
 /// Resident memory of this process \[B\]; 0 where the system does not say.

@@ -1,7 +1,8 @@
 //! What went wrong on this rank, in words, and the post-mortem file with the particles concerned.
 
 use super::Simulation;
-use super::contacts::PassFault;
+use super::strips::PassFault;
+use crate::contact::section::Partners;
 use crate::error::{Error, Result};
 use crate::state::ParticleState;
 use serde_json::{Value, json};
@@ -12,8 +13,11 @@ impl Simulation {
         let Some(fault) = fault else { return Ok(()) };
         let key = self.contacts.key(fault.section, fault.place, &self.particles, self.model.lists.total);
         let section = &self.contacts.sections[fault.section];
-        let local = [section.first[fault.place], section.second[fault.place]];
-        let owned: Vec<usize> = local.iter().map(|i| *i as usize).filter(|i| *i < self.particles.owned).collect();
+        let mut local = vec![section.first_of(fault.place)];
+        if section.partners != Partners::Wall {
+            local.push(section.second_of(fault.place));
+        }
+        let owned: Vec<usize> = local.into_iter().filter(|i| *i < self.particles.owned).collect();
         self.write_post_mortem(&owned);
         Err(Error::Simulation {
             step: self.global.step,
@@ -62,19 +66,22 @@ impl Simulation {
     }
 
     fn particle_json(&self, index: usize) -> Value {
-        let ParticleState { id, species, position, radius, velocity, acceleration, spin, .. } =
+        let ParticleState { id, species, position, radius, velocity, full_velocity, spin, .. } =
             self.particles.state(index);
-        let contacts: Vec<Value> = self.contacts.ends_of(index).iter().map(|end| {
-            let (number, place) = self.contacts.locate(end.line());
-            let section = &self.contacts.sections[number];
-            let key = self.contacts.key(number, place, &self.particles, self.model.lists.total);
-            let mut memory = vec![0.0; section.columns];
-            section.read_memory(place, &mut memory);
-            let stride = self.lines.stride;
-            let line = &self.lines.values[end.line() * stride..(end.line() + 1) * stride];
-            json!({ "low": key.low, "high": key.high, "shift": &key.shift[..3], "memory": memory, "force_on_low_N": &line[..3] })
-        }).collect();
+        let contacts: Vec<Value> = self
+            .contacts
+            .ends_of(index)
+            .iter()
+            .map(|end| {
+                let (number, place) = self.contacts.locate(end.line());
+                let section = &self.contacts.sections[number];
+                let key = self.contacts.key(number, place, &self.particles, self.model.lists.total);
+                let mut memory = vec![0.0; section.columns];
+                section.read_memory(place, &mut memory);
+                json!({ "low": key.low, "high": key.high, "shift": &key.shift[..3], "memory": memory })
+            })
+            .collect();
         json!({ "id": id, "species": species, "position_m": position, "radius_m": radius, "velocity_m_per_s": velocity,
-            "acceleration_m_per_s2": acceleration, "spin_rad_per_s": spin, "contacts": contacts })
+            "full_step_velocity_m_per_s": full_velocity, "spin_rad_per_s": spin, "contacts": contacts })
     }
 }

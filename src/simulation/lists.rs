@@ -6,9 +6,13 @@ use crate::error::Result;
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
+use std::ops::Range;
 
 /// Skin of the contact list as a fraction of the largest diameter.
 const INNER_SKIN: f64 = 0.005;
+
+/// With fewer particles per thread threads cost more than they give.
+const MIN_PARTICLES_PER_STRIP: usize = 1000;
 
 /// How much motion the lists still bear. Results never depend on it: it only has to be safe.
 #[derive(Debug, Clone, Copy, Default)]
@@ -66,9 +70,8 @@ impl Simulation {
         } else if 2.0 * displacement >= room(inner_low, self.model.inner_skin()) {
             self.timers.start(Stage::Neighbours);
             self.update_ghosts();
-            let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
             self.budget.displaced = displaced;
-            self.rebuild_contacts(&memory);
+            self.rebuild_contacts();
             self.timers.contact_rebuilds += 1;
             self.timers.stop();
         }
@@ -79,12 +82,13 @@ impl Simulation {
     /// of the particles that are here.
     pub(super) fn rebuild_all(&mut self, mut memory: ContactMemory) -> Result<()> {
         let sides = self.global.sides;
+        self.contacts.cut(Vec::new(), 0, &self.model.lists.columns);
         self.particles.drop_ghosts();
         let setting = MigrationSetting {
             decomposition: &self.decomposition,
             species: &self.model.species,
             sides,
-            time_step: self.global.previous_time_step,
+            extras: self.model.extras(),
             particles_total: self.global.particles,
             step: self.global.step,
         };
@@ -98,21 +102,42 @@ impl Simulation {
             max_radius: self.model.max_radius,
             skin: self.model.outer_skin(),
         };
-        self.particles.reorder(&region.spatial_order(&self.particles));
         let reach = region.max_radius + region.skin;
+        // Particles that other ranks see come last, each part in order of space.
+        let seen =
+            HaloPlan::seen_elsewhere(&self.comm, &self.decomposition, &self.particles, sides, region.periodic, reach);
+        let mut order = region.spatial_order(&self.particles);
+        order.sort_by_key(|particle| seen[*particle as usize]);
+        let inner = seen.iter().filter(|seen| !**seen).count();
+        self.particles.reorder(&order);
         self.halo =
             HaloPlan::build(&self.comm, &self.decomposition, &mut self.particles, sides, region.periodic, reach)?;
         self.candidates = region.candidates(&self.particles);
+        self.reference.reset(&self.particles);
+        let mut strips = self.cut(0..inner);
+        let inner_strips = strips.len();
+        strips.extend(self.cut(inner..self.particles.owned));
+        self.model.lists.start(&mut self.contacts, &self.particles, &mut self.candidates, strips, inner_strips);
         self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0 };
-        self.rebuild_contacts(&memory);
+        self.rebuild_contacts();
+        self.model.lists.restore(&mut self.contacts, &self.particles, &memory);
         Ok(())
     }
 
-    fn rebuild_contacts(&mut self, memory: &ContactMemory) {
+    /// Equal parts of a range of particles, one per thread if that pays.
+    fn cut(&self, particles: Range<usize>) -> Vec<Range<usize>> {
+        let count = particles.len();
+        let parts = if count < MIN_PARTICLES_PER_STRIP * self.threads { 1 } else { self.threads };
+        let bound = |part: usize| particles.start + count * part / parts;
+        (0..parts).map(|part| bound(part)..bound(part + 1)).filter(|range| !range.is_empty()).collect()
+    }
+
+    fn rebuild_contacts(&mut self) {
         let sides = self.global.sides;
         self.budget.reference_sides = sides;
-        self.model.lists.fill(&mut self.contacts, &self.particles, sides, &self.candidates, memory);
-        self.lines.fit(&self.contacts, self.model.config.output.energy_ledger);
-        self.reference.take(&self.particles);
+        let crossed = &self.reference.crossed;
+        self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
+        self.lines.fit(&self.contacts);
+        self.reference.take(&self.particles, sides);
     }
 }

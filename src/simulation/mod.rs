@@ -1,39 +1,37 @@
 //! The simulation of one rank: all state and the step that moves it, in the order of ARCHITECTURE.md.
 //! Only this module and `setup` see all stages.
 
-mod contacts;
 mod fault;
 mod lists;
 mod report;
 mod snapshot;
+mod strips;
 mod timers;
 
 pub use report::Report;
 pub use timers::{STAGES, Stage, Timers};
 
-use crate::config::{Config, Kinematics};
+use crate::config::{AxisControl, Config, Kinematics};
 use crate::contact::build::BuildContext;
-use crate::contact::list::{ContactList, Partners};
+use crate::contact::list::ContactList;
+use crate::contact::section::Partners;
 use crate::contact::shift::ShiftTable;
 use crate::error::Result;
 use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, agree};
 use crate::force::geometry::CellMotion;
 use crate::force::law::Column;
-use crate::force::observe::Wanted;
-use crate::force::pass::PairPass;
-use crate::integrate::gather::Lines;
-use crate::integrate::leap_frog::{self, Reference, StepMotion, StepResult};
+use crate::force::observe::{Observation, Wanted};
+use crate::force::pass::{LEDGER_STRIDE, PairPass, PassInput};
+use crate::force::simd::Simd;
+use crate::integrate::leap_frog::{Reference, Slice, StepMotion, StepResult};
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::{LoadProgramme, StepPlan};
-use crate::neighbour::verlet::Candidate;
-use crate::state::particles::{Particles, SpeciesConstants};
+use crate::neighbour::verlet::Candidates;
+use crate::state::particles::{Extras, Particles, SpeciesConstants};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
-use contacts::{ContactPhase, PassFault, Passed};
 use lists::ListBudget;
 use std::sync::Arc;
-
-/// Below this many contacts per rank threads cost more than they give.
-const PARALLEL_CONTACTS: usize = 8192;
+use strips::{LineBuffers, PassFault, Phase};
 
 /// Every law may damp or rub, so ghosts always carry velocities.
 const GHOSTS: HaloContent = HaloContent { velocities: true };
@@ -58,6 +56,8 @@ pub struct Model {
     pub solid_volume: f64,
     /// Some particle turns or can be made to turn.
     pub rotation: bool,
+    /// Instructions that the passes use.
+    pub simd: Simd,
 }
 
 impl Model {
@@ -65,6 +65,20 @@ impl Model {
     #[must_use]
     pub fn stride(&self) -> usize {
         self.passes.iter().map(|pass| pass.stride()).max().unwrap_or(4)
+    }
+
+    /// What of particles is followed beside their motion.
+    #[must_use]
+    pub fn extras(&self) -> Extras {
+        let output = &self.config.output;
+        Extras { orientation: output.orientations, ledger: output.energy_ledger }
+    }
+
+    /// The programme looks at the stress: it steers it or ends a stage by it.
+    fn needs_stress(&self) -> bool {
+        self.programme.stages.iter().any(|stage| {
+            stage.until_stress.is_some() || stage.axes.iter().any(|axis| matches!(axis, AxisControl::Stress { .. }))
+        })
     }
 
     /// Memory columns per pair of materials.
@@ -82,12 +96,14 @@ pub struct Simulation {
     global: GlobalState,
     particles: Particles,
     halo: HaloPlan,
-    candidates: Vec<Candidate>,
+    candidates: Candidates,
     contacts: ContactList,
-    lines: Lines,
+    lines: LineBuffers,
     reference: Reference,
     budget: ListBudget,
     ghost_wraps: Vec<(u32, [i32; 3])>,
+    /// Per line, force and touch of the last look at single contacts; empty between looks.
+    forces: Vec<[f64; 4]>,
     timers: Timers,
     threads: usize,
     max_stiffness: f64,
@@ -119,20 +135,22 @@ impl Simulation {
         memory: ContactMemory,
         threads: usize,
     ) -> Result<Self> {
-        let contacts = model.lists.empty_list();
-        let lines = Lines { stride: model.stride(), ..Lines::default() };
+        let width = model.stride();
+        let stride = width + if model.config.output.energy_ledger { LEDGER_STRIDE } else { 0 };
+        let lines = LineBuffers::new(width, stride);
         let mut simulation = Self {
             comm,
             decomposition,
             global,
             particles,
             halo: HaloPlan::default(),
-            candidates: Vec::new(),
-            contacts,
+            candidates: Candidates::default(),
+            contacts: ContactList::default(),
             lines,
             reference: Reference::default(),
             budget: ListBudget::default(),
             ghost_wraps: Vec::new(),
+            forces: Vec::new(),
             timers: Timers::default(),
             threads,
             max_stiffness: 0.0,
@@ -224,38 +242,49 @@ impl Simulation {
         requests: Requests,
         each: impl FnOnce(&mut Self, &Report) -> Result<()>,
     ) -> Result<Requests> {
+        self.prepare();
         let control = self.control_is_due();
-        let observe = Wanted {
-            sums: wanted.sums || control,
-            samples: wanted.samples,
-            ledger: self.model.config.output.energy_ledger,
-        };
-        let passed = self.contact_pass(observe);
-        let fault = passed.fault;
-        if observe.sums || observe.samples {
-            let mut report = self.reduce(passed.observation.unwrap_or_default(), wanted);
-            if control {
-                self.control(&report)?;
-                report.row.time_step = self.global.time_step;
-            }
-            if wanted.sums || wanted.samples {
-                each(self, &report)?;
-            }
+        let looking = control || wanted.sums || wanted.samples;
+        if looking {
+            self.look(wanted, control, each)?;
         }
         let plan = self.model.programme.plan(&self.global, self.global.time_step);
-        let moved = self.move_particles(&plan);
+        let (moved, fault) = self.move_on(&plan, looking);
         self.agree_on_step(fault, &moved, requests)
     }
 
     /// Observe the present state without moving on (the end of a run).
     ///
     /// # Errors
-    /// An overlap beyond the limit, the same error on every rank.
+    /// None at present; the overlap limit is checked by the next step.
     pub fn observe(&mut self, wanted: Wanted) -> Result<Report> {
-        let passed = self.contact_pass(wanted);
-        let faults = self.describe_pass_fault(passed.fault);
-        agree(&self.comm, faults)?;
-        Ok(self.reduce(passed.observation.unwrap_or_default(), wanted))
+        self.prepare();
+        self.update_ghosts();
+        let observation = self.observe_contacts(wanted);
+        Ok(self.reduce(observation, wanted))
+    }
+
+    /// What is due at the present positions: control of time step and load, reports.
+    fn look(
+        &mut self,
+        wanted: Wanted,
+        control: bool,
+        each: impl FnOnce(&mut Self, &Report) -> Result<()>,
+    ) -> Result<()> {
+        self.timers.start(Stage::Halo);
+        self.update_ghosts();
+        let observe = Wanted { sums: wanted.sums || control && self.model.needs_stress(), ..wanted };
+        let observation = self.observe_contacts(observe);
+        let mut report = self.reduce(observation, observe);
+        if control {
+            self.control(&report)?;
+            report.row.time_step = self.global.time_step;
+        }
+        if wanted.sums || wanted.samples {
+            each(self, &report)?;
+        }
+        self.forces = Vec::new();
+        Ok(())
     }
 
     fn control_is_due(&self) -> bool {
@@ -288,15 +317,12 @@ impl Simulation {
 
     /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
     fn update_ghosts(&mut self) {
-        self.ghost_wraps.clear();
         self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |_| ());
-        for (ghost, wraps) in &self.ghost_wraps {
-            self.contacts.apply_wrap(*ghost as usize, *wraps);
-        }
+        take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
     }
 
-    /// Halo exchange over the contacts of owned particles, then the contacts with ghosts.
-    fn contact_pass(&mut self, wanted: Wanted) -> Passed {
+    /// Let the laws know the time since the last evaluation.
+    fn prepare(&mut self) {
         let elapsed = self.global.previous_time_step;
         if elapsed.to_bits() != self.prepared_for.to_bits() {
             self.prepared_for = elapsed;
@@ -304,47 +330,93 @@ impl Simulation {
                 pass.prepare(elapsed);
             }
         }
-        let motion = self.cell_motion();
-        let phase = ContactPhase {
-            passes: &self.model.passes,
-            motion: &motion,
-            owned: self.particles.owned,
+    }
+
+    fn pass_input<'a>(&self, motion: &'a CellMotion) -> PassInput<'a> {
+        PassInput {
+            motion,
+            stride: self.lines.stride,
+            ledger: self.model.config.output.energy_ledger,
             max_overlap_fraction: self.model.config.max_overlap_fraction,
-            time_step: elapsed,
-            wanted: (wanted.sums || wanted.samples || wanted.ledger).then_some(wanted),
-            parallel: self.parallel(),
-        };
-        self.ghost_wraps.clear();
-        let first_ghost = self.contacts.sections.partition_point(|s| s.partners != Partners::Ghost);
-        self.timers.start(Stage::Halo);
-        let mut passed =
-            self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |particles| {
-                self.timers.start(Stage::Contacts);
-                let sections = &mut self.contacts.sections[..first_ghost];
-                let passed = phase.run(particles, sections, 0, &mut self.lines);
-                self.timers.start(Stage::Halo);
-                passed
-            });
-        for (ghost, wraps) in &self.ghost_wraps {
-            self.contacts.apply_wrap(*ghost as usize, *wraps);
+            time_step: self.global.previous_time_step,
+            simd: self.model.simd,
         }
-        self.timers.start(Stage::Contacts);
-        let sections = &mut self.contacts.sections[first_ghost..];
-        passed.absorb(phase.run(&self.particles, sections, first_ghost, &mut self.lines));
+    }
+
+    /// Look at all contacts; the ghosts are up to date.
+    fn observe_contacts(&mut self, wanted: Wanted) -> Observation {
+        self.timers.start(Stage::Observe);
+        let motion = self.cell_motion();
+        let phase = Phase { passes: &self.model.passes, input: self.pass_input(&motion) };
+        let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
+        self.forces = vec![[0.0; 4]; lines];
+        let particles = &self.particles;
+        let observation = phase.observe(&self.contacts, &particles.record, particles.owned, wanted, &mut self.forces);
         self.timers.stop();
-        passed
+        observation
     }
 
-    fn parallel(&self) -> bool {
-        self.threads > 1 && self.contacts.lines > PARALLEL_CONTACTS
+    /// Contacts, sum and motion. While the ghosts fly, those particles move that no other rank sees. `fresh`: the
+    /// ghosts are up to date.
+    fn move_on(&mut self, plan: &StepPlan, fresh: bool) -> (StepResult, Option<PassFault>) {
+        let cell = self.cell_motion();
+        let motion = self.step_motion(plan);
+        let input = self.pass_input(&cell);
+        let Self { comm, model, halo, particles, contacts, lines, reference, ghost_wraps, timers, .. } = self;
+        let phase = Phase { passes: &model.passes, input };
+        let (inner, strips) = (contacts.inner, contacts.strips.len());
+        let moving = if inner == strips { particles.owned } else { contacts.strips[inner].particles.start };
+        let inner_part = |particles: &mut Particles,
+                          contacts: &mut ContactList,
+                          lines: &mut LineBuffers,
+                          reference: &mut Reference,
+                          timers: &mut Timers| {
+            timers.start(Stage::Contacts);
+            let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], &particles.record, lines);
+            timers.start(Stage::Step);
+            let (slice, _) = Slice::new(particles, reference).split(moving);
+            let (result, near_fault) = phase.near(contacts, 0..inner, slice, lines, &motion);
+            (result, fault.or(near_fault))
+        };
+        let (mut result, mut fault) = if fresh {
+            inner_part(particles, contacts, lines, reference, timers)
+        } else {
+            timers.start(Stage::Halo);
+            halo.update(comm, particles, GHOSTS, ghost_wraps, |particles| {
+                let result = inner_part(particles, contacts, lines, reference, timers);
+                timers.start(Stage::Halo);
+                result
+            })
+        };
+        if inner < strips {
+            if !fresh {
+                take_ghost_wraps(ghost_wraps, contacts, reference);
+            }
+            timers.start(Stage::Contacts);
+            let ghost_fault = phase.kept(contacts, &[Partners::Ghost], &particles.record, lines);
+            timers.start(Stage::Step);
+            let (_, slice) = Slice::new(particles, reference).split(moving);
+            let (border, near_fault) = phase.near(contacts, inner..strips, slice, lines, &motion);
+            result.absorb(border);
+            fault = fault.or(ghost_fault).or(near_fault);
+        }
+        for (particle, wraps) in &result.wrapped {
+            self.contacts.apply_wrap(*particle as usize, *wraps);
+        }
+        self.global.step += 1;
+        self.global.time = plan.next_time;
+        self.global.previous_time_step = plan.time_step;
+        self.global.strain = plan.next_strain;
+        self.global.sides = plan.next_sides;
+        self.timers.stop();
+        (result, fault)
     }
 
-    /// Sum the forces, move the particles and the cell.
-    fn move_particles(&mut self, plan: &StepPlan) -> StepResult {
+    fn step_motion(&self, plan: &StepPlan) -> StepMotion {
         let kinematics = self.model.programme.kinematics;
-        let sides = plan.next_sides;
-        let old = self.global.sides;
-        let motion = StepMotion {
+        let (old, sides) = (self.global.sides, plan.next_sides);
+        let extras = self.model.extras();
+        StepMotion {
             previous_time_step: self.global.previous_time_step,
             time_step: plan.time_step,
             gravity: self.model.config.gravity,
@@ -358,21 +430,10 @@ impl Simulation {
             },
             periodic: self.periodic(),
             rotation: self.model.rotation,
-            ledger: self.model.config.output.energy_ledger,
-            parallel: self.parallel(),
-        };
-        self.timers.start(Stage::Integrate);
-        let result = leap_frog::advance(&mut self.particles, &mut self.reference, &self.contacts, &self.lines, &motion);
-        for (particle, wraps) in &result.wrapped {
-            self.contacts.apply_wrap(*particle as usize, *wraps);
+            ledger: extras.ledger,
+            orientation: extras.orientation,
+            simd: self.model.simd,
         }
-        self.global.step += 1;
-        self.global.time = plan.next_time;
-        self.global.previous_time_step = plan.time_step;
-        self.global.strain = plan.next_strain;
-        self.global.sides = sides;
-        self.timers.stop();
-        result
     }
 
     /// One reduction per step: staleness of the lists, faults, requests. Rebuilds what is stale.
@@ -398,5 +459,13 @@ impl Simulation {
 
     fn periodic(&self) -> [bool; 3] {
         self.model.lists.walls.map(|wall| wall.is_none())
+    }
+}
+
+/// Adjust contacts and counters of ghosts that crossed a periodic face.
+fn take_ghost_wraps(wraps: &[(u32, [i32; 3])], contacts: &mut ContactList, reference: &mut Reference) {
+    for (ghost, wraps) in wraps {
+        contacts.apply_wrap(*ghost as usize, *wraps);
+        reference.cross(*ghost as usize, *wraps);
     }
 }

@@ -46,7 +46,9 @@ impl Simulation {
         self.timers.start(Stage::Reduce);
         observation.sums.resize(ALL_SUMS, ExactSum::new());
         let max_speed = self.add_particle_sums(&mut observation, wanted);
-        exact_sum::reduce(&self.comm, &mut observation.sums);
+        if wanted.sums {
+            exact_sum::reduce(&self.comm, &mut observation.sums);
+        }
         let mut largest = [observation.max_stiffness, observation.max_overlap_ratio, max_speed];
         self.comm.max_f64(&mut largest);
         let values: Vec<f64> = observation.sums.iter().map(ExactSum::value).collect();
@@ -119,14 +121,14 @@ impl Simulation {
             }
             if record.inverse_mass > 0.0 {
                 sums[ParticleSum::Free as usize].add(1.0);
-                sums[ParticleSum::NetForce as usize].add(record.mass * dot(self.particles.acceleration[index]).sqrt());
+                sums[ParticleSum::NetForce as usize].add(dot(self.net_force(index)).sqrt());
             }
             let touching = self.touching(index);
             if touching < RATTLER_CONTACTS {
                 sums[ParticleSum::Rattlers as usize].add(1.0);
                 sums[ParticleSum::RattlerContacts as usize].add(f64::from(touching));
             }
-            for (k, value) in self.particles.ledger[index].iter().enumerate() {
+            for (k, value) in self.particles.ledger.get(index).into_iter().flatten().enumerate() {
                 sums[ParticleSum::Ledger as usize + k].add(*value);
             }
         }
@@ -141,16 +143,29 @@ impl Simulation {
         [0, 1, 2].map(|k| per_image[k] / motion.sides[k])
     }
 
-    /// Number of touching contacts of an owned particle, from the lines of the last pass.
+    /// Number of touching contacts of an owned particle at the last look at single contacts.
     pub(super) fn touching(&self, particle: usize) -> u32 {
-        let stride = self.lines.stride;
-        let ends = self.contacts.ends_of(particle).iter();
-        ends.filter(|end| self.lines.values[end.line() * stride + 3] > 0.0).count() as u32
+        self.contacts.ends_of(particle).iter().filter(|end| self.forces[end.line()][3] > 0.0).count() as u32
+    }
+
+    /// Sum of all forces on an owned particle at the last look at single contacts \[N\].
+    fn net_force(&self, particle: usize) -> [f64; 3] {
+        let mass = self.particles.record[particle].mass;
+        let mut sum = self.model.config.gravity.map(|g| mass * g);
+        for end in self.contacts.ends_of(particle) {
+            let sign = if end.is_second() { -1.0 } else { 1.0 };
+            for (total, force) in sum.iter_mut().zip(self.forces[end.line()]) {
+                *total += sign * force;
+            }
+        }
+        sum
     }
 
     /// Time step and servo from what was measured at a control step.
     pub(super) fn control(&mut self, report: &Report) -> Result<()> {
-        self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        if self.model.needs_stress() {
+            self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        }
         let interval = self.global.time_step * self.model.config.control_interval as f64;
         let stiffness = if self.max_stiffness > self.model.time_step.reference_stiffness {
             self.max_stiffness

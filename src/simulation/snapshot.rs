@@ -24,7 +24,7 @@ impl Simulation {
                     species: self.particles.species[index],
                     position: record.position,
                     radius: record.radius,
-                    orientation: self.particles.orientation[index],
+                    orientation: self.particles.state(index).orientation,
                     velocity: record.velocity,
                     angular_velocity: record.spin,
                     stress_trace: virial / volume,
@@ -50,7 +50,7 @@ impl Simulation {
             shown.memory.extend_from_slice(&row);
             shown.contacts.push(SnapshotContact {
                 key: self.contacts.key(number, place, &self.particles, self.model.lists.total),
-                start: self.particles.record[section.first[place] as usize].position,
+                start: self.particles.record[section.first_of(place)].position,
                 branch: sample.branch,
                 force: sample.force.map(|f| -f),
                 normal_force: sample.normal_force,

@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 pub enum Stage {
     /// Verlet list, contact list, migration.
     Neighbours,
-    /// Contact passes.
+    /// Contacts whose forces are kept: across periodic faces, strips and ranks, and with walls.
     Contacts,
-    /// Ordered sum and motion.
-    Integrate,
+    /// The other contacts with sum and motion, chunk by chunk.
+    Step,
+    /// Looks at the state: time step, load, reports.
+    Observe,
     /// Halo exchange (waiting and packing).
     Halo,
     /// Agreement and global sums.
@@ -21,10 +23,11 @@ pub enum Stage {
 }
 
 /// Stages in the order of the table.
-pub const STAGES: [(Stage, &str); 6] = [
+pub const STAGES: [(Stage, &str); 7] = [
     (Stage::Neighbours, "neighbours"),
-    (Stage::Contacts, "contacts"),
-    (Stage::Integrate, "sum and motion"),
+    (Stage::Contacts, "border contacts"),
+    (Stage::Step, "contacts, motion"),
+    (Stage::Observe, "observation"),
     (Stage::Halo, "halo"),
     (Stage::Reduce, "reduce"),
     (Stage::Output, "output"),

@@ -18,13 +18,13 @@ pub struct ParticleState {
     pub radius: f64,
     /// Velocity at the last half step \[m/s\].
     pub velocity: [f64; 3],
-    /// Acceleration at the last full step \[m/s²\].
-    pub acceleration: [f64; 3],
+    /// Velocity at the full step, extrapolated with the last acceleration, W (2.3) \[m/s\].
+    pub full_velocity: [f64; 3],
     /// Angular velocity at the last half step \[rad/s\].
     pub spin: [f64; 3],
-    /// Angular acceleration at the last full step \[rad/s²\].
-    pub angular_acceleration: [f64; 3],
-    /// Orientation, unit quaternion (w, x, y, z).
+    /// Angular velocity at the full step \[rad/s\].
+    pub full_spin: [f64; 3],
+    /// Orientation, unit quaternion (w, x, y, z); (1, 0, 0, 0) where orientations are not followed.
     pub orientation: [f64; 4],
     /// Energy ledger of this particle \[J\], see [`LEDGER`]; zero when the ledger is off.
     pub ledger: [f64; LEDGER.len()],

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 /// What the contact pass reads of a particle, packed into 96 bytes so that one contact touches two
 /// short runs of memory. Velocities are those at the full step (W 2.3).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
+#[repr(C, align(32))]
 pub struct Record {
     /// Wrapped position \[m\].
     pub position: [f64; 3],
@@ -46,23 +46,27 @@ pub struct Particles {
     pub image: Vec<[i32; 3]>,
     /// Velocity at the last half step.
     pub velocity: Vec<[f64; 3]>,
-    /// Acceleration at the last full step.
-    pub acceleration: Vec<[f64; 3]>,
     /// Angular velocity at the last half step.
     pub spin: Vec<[f64; 3]>,
-    /// Angular acceleration at the last full step.
-    pub angular_acceleration: Vec<[f64; 3]>,
-    /// Orientation, unit quaternion (w, x, y, z).
+    /// Orientation, unit quaternion (w, x, y, z); empty where orientations are not followed.
     pub orientation: Vec<[f64; 4]>,
-    /// Energy ledger per particle.
+    /// Energy ledger per particle; empty when the ledger is off.
     pub ledger: Vec<[f64; LEDGER.len()]>,
 }
 
+/// What of a particle is followed only on request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extras {
+    /// Orientations.
+    pub orientation: bool,
+    /// Energy ledger.
+    pub ledger: bool,
+}
+
 impl Particles {
-    /// Owned particles from their states. The record's full-step velocities are extrapolated with the
-    /// last acceleration over half of `time_step`, the step that led here (W 2.3).
+    /// Owned particles from their states.
     #[must_use]
-    pub fn from_states(states: &[ParticleState], species: &[SpeciesConstants], time_step: f64) -> Self {
+    pub fn from_states(states: &[ParticleState], species: &[SpeciesConstants], extras: Extras) -> Self {
         let mut particles = Self { owned: states.len(), ..Self::default() };
         for state in states {
             let constants = species[state.species as usize];
@@ -70,18 +74,20 @@ impl Particles {
             particles.species.push(state.species);
             particles.image.push(state.image);
             particles.velocity.push(state.velocity);
-            particles.acceleration.push(state.acceleration);
             particles.spin.push(state.spin);
-            particles.angular_acceleration.push(state.angular_acceleration);
-            particles.orientation.push(state.orientation);
-            particles.ledger.push(state.ledger);
+            if extras.orientation {
+                particles.orientation.push(state.orientation);
+            }
+            if extras.ledger {
+                particles.ledger.push(state.ledger);
+            }
             let mass = sphere_mass(state.radius, constants.density);
             particles.record.push(Record {
                 position: state.position,
                 radius: state.radius,
-                velocity: synchronised(state.velocity, state.acceleration, time_step),
+                velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
-                spin: synchronised(state.spin, state.angular_acceleration, time_step),
+                spin: state.full_spin,
                 mass,
             });
         }
@@ -98,11 +104,11 @@ impl Particles {
             position: record.position,
             radius: record.radius,
             velocity: self.velocity[index],
-            acceleration: self.acceleration[index],
+            full_velocity: record.velocity,
             spin: self.spin[index],
-            angular_acceleration: self.angular_acceleration[index],
-            orientation: self.orientation[index],
-            ledger: self.ledger[index],
+            full_spin: record.spin,
+            orientation: self.orientation.get(index).copied().unwrap_or([1.0, 0.0, 0.0, 0.0]),
+            ledger: self.ledger.get(index).copied().unwrap_or_default(),
             image: self.image[index],
             reserved: 0,
         }
@@ -128,20 +134,20 @@ impl Particles {
 
     /// Put the owned particles into a new order (no ghosts may be there).
     pub fn reorder(&mut self, order: &[u32]) {
-        fn permuted<T: Copy>(values: &[T], order: &[u32]) -> Vec<T> {
-            order.iter().map(|index| values[*index as usize]).collect()
+        fn permute<T: Copy>(values: &mut Vec<T>, order: &[u32]) {
+            if !values.is_empty() {
+                *values = order.iter().map(|index| values[*index as usize]).collect();
+            }
         }
         debug_assert_eq!(order.len(), self.len());
-        self.id = permuted(&self.id, order);
-        self.species = permuted(&self.species, order);
-        self.record = permuted(&self.record, order);
-        self.image = permuted(&self.image, order);
-        self.velocity = permuted(&self.velocity, order);
-        self.acceleration = permuted(&self.acceleration, order);
-        self.spin = permuted(&self.spin, order);
-        self.angular_acceleration = permuted(&self.angular_acceleration, order);
-        self.orientation = permuted(&self.orientation, order);
-        self.ledger = permuted(&self.ledger, order);
+        permute(&mut self.id, order);
+        permute(&mut self.species, order);
+        permute(&mut self.record, order);
+        permute(&mut self.image, order);
+        permute(&mut self.velocity, order);
+        permute(&mut self.spin, order);
+        permute(&mut self.orientation, order);
+        permute(&mut self.ledger, order);
     }
 
     /// Forget the ghosts.

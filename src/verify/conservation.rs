@@ -80,7 +80,7 @@ fn gas_run(time_step: f64, restitution: f64, friction: f64) -> Result<GasRun> {
     let mut ends: Vec<HistoryRow> = Vec::new();
     drive(
         &mut simulation,
-        |global| Wanted { sums: global.step == 0 || global.stage > 0, ledger: true, ..Wanted::default() },
+        |global| Wanted { sums: global.step == 0 || global.stage > 0, ..Wanted::default() },
         |_, report| {
             ends.push(report.row);
             Ok(())

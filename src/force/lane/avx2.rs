@@ -1,0 +1,197 @@
+//! Four lanes in one AVX2 register; as in the file beside this one, the functions run only where the
+//! processor has been asked.
+
+use super::{Lane, RECORD};
+use crate::state::particles::Record;
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// Four `f64`.
+#[derive(Debug, Clone, Copy)]
+pub struct F64x4(__m256d);
+
+/// Result of comparisons of [`F64x4`]: all bits of a lane set or none.
+#[derive(Debug, Clone, Copy)]
+pub struct Mask4(__m256d);
+
+macro_rules! operator {
+    ($type:ident, $trait:ident, $name:ident, $intrinsic:ident) => {
+        impl $trait for $type {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: the processor has AVX2 (head of this file).
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+operator!(F64x4, Add, add, _mm256_add_pd);
+operator!(F64x4, Sub, sub, _mm256_sub_pd);
+operator!(F64x4, Mul, mul, _mm256_mul_pd);
+operator!(F64x4, Div, div, _mm256_div_pd);
+operator!(Mask4, BitAnd, bitand, _mm256_and_pd);
+operator!(Mask4, BitOr, bitor, _mm256_or_pd);
+
+impl Neg for F64x4 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file). Flips the sign bit, as scalar negation.
+        Self(unsafe { _mm256_xor_pd(self.0, _mm256_set1_pd(-0.0)) })
+    }
+}
+
+impl Not for Mask4 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Self(unsafe { _mm256_xor_pd(self.0, _mm256_castsi256_pd(_mm256_set1_epi64x(-1))) })
+    }
+}
+
+/// Transposes four rows of four.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
+    // SAFETY: as the function's.
+    unsafe {
+        let even = [_mm256_unpacklo_pd(rows[0], rows[1]), _mm256_unpacklo_pd(rows[2], rows[3])];
+        let odd = [_mm256_unpackhi_pd(rows[0], rows[1]), _mm256_unpackhi_pd(rows[2], rows[3])];
+        [
+            _mm256_permute2f128_pd::<0x20>(even[0], even[1]),
+            _mm256_permute2f128_pd::<0x20>(odd[0], odd[1]),
+            _mm256_permute2f128_pd::<0x31>(even[0], even[1]),
+            _mm256_permute2f128_pd::<0x31>(odd[0], odd[1]),
+        ]
+    }
+}
+
+/// Ask for both cache lines of some records.
+#[inline(always)]
+pub fn prefetch(records: &[Record], index: &[u32]) {
+    for place in index {
+        let record = records.as_ptr().wrapping_add(*place as usize).cast::<i8>();
+        // SAFETY: a prefetch is a hint: it never faults, whatever the address.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(record);
+            _mm_prefetch::<_MM_HINT_T0>(record.wrapping_add(64));
+        }
+    }
+}
+
+impl Lane for F64x4 {
+    type Mask = Mask4;
+    const WIDTH: usize = 4;
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Self(unsafe { _mm256_set1_pd(value) })
+    }
+    #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        let values = &values[..4];
+        // SAFETY: the processor has AVX2 (head of this file); the slice holds four numbers.
+        Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64]) {
+        let values = &mut values[..4];
+        // SAFETY: the processor has AVX2 (head of this file); the slice holds four numbers.
+        unsafe { _mm256_storeu_pd(values.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Self(unsafe { _mm256_sqrt_pd(self.0) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file). The instruction gives the second operand unless
+        // the first is greater.
+        Self(unsafe { _mm256_max_pd(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as `max`, with less.
+        Self(unsafe { _mm256_min_pd(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> Mask4 {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Mask4(unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn greater(self, other: Self) -> Mask4 {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Mask4(unsafe { _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn at_least(self, other: Self) -> Mask4 {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Mask4(unsafe { _mm256_cmp_pd::<_CMP_GE_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Self(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
+    }
+    #[inline(always)]
+    fn any(mask: Mask4) -> bool {
+        // SAFETY: the processor has AVX2 (head of this file).
+        unsafe { _mm256_movemask_pd(mask.0) != 0 }
+    }
+    #[inline(always)]
+    fn lane(mask: Mask4, lane: usize) -> bool {
+        // SAFETY: the processor has AVX2 (head of this file).
+        unsafe { _mm256_movemask_pd(mask.0) >> lane & 1 == 1 }
+    }
+    #[inline(always)]
+    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
+        let index = &index[..4];
+        let row: [*const f64; 4] = std::array::from_fn(|k| (&raw const records[index[k] as usize]).cast());
+        let mut columns = [Self::splat(0.0); RECORD];
+        for group in 0..RECORD / 4 {
+            // SAFETY: the processor has AVX2 (head of this file); each row points at the twelve numbers of a
+            // record, of which four are read from 4·group on.
+            let [x, y, z, w] = unsafe {
+                transpose([
+                    _mm256_loadu_pd(row[0].add(4 * group)),
+                    _mm256_loadu_pd(row[1].add(4 * group)),
+                    _mm256_loadu_pd(row[2].add(4 * group)),
+                    _mm256_loadu_pd(row[3].add(4 * group)),
+                ])
+            };
+            columns[4 * group] = Self(x);
+            columns[4 * group + 1] = Self(y);
+            columns[4 * group + 2] = Self(z);
+            columns[4 * group + 3] = Self(w);
+        }
+        columns
+    }
+    #[inline(always)]
+    fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {
+        assert!(rows.len() >= 3 * stride + offset + 4);
+        let start = rows.as_mut_ptr();
+        // SAFETY: the processor has AVX2 (head of this file); the last of the four numbers written per row,
+        // at 3·stride + offset + 3, lies inside the slice.
+        unsafe {
+            let lines = transpose([values[0].0, values[1].0, values[2].0, values[3].0]);
+            for k in 0..4 {
+                _mm256_storeu_pd(start.add(k * stride + offset), lines[k]);
+            }
+        }
+    }
+    #[inline(always)]
+    fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {
+        let values: [f64; 4] = std::array::from_fn(|k| table[usize::from((codes[k] >> bits) & 7)]);
+        Self::load(&values)
+    }
+    #[inline(always)]
+    fn prefetch(records: &[Record], index: &[u32]) {
+        prefetch(records, &index[..4]);
+    }
+}

@@ -1,0 +1,222 @@
+//! Eight lanes in one AVX-512 register.
+//!
+//! Every function compiles to instructions that need AVX-512 F and VL: they run only inside the pass that
+//! [`super::super::simd`] has chosen after asking the processor, and are inlined there.
+
+use super::{Lane, RECORD};
+use crate::state::particles::Record;
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+/// Eight `f64`.
+#[derive(Debug, Clone, Copy)]
+pub struct F64x8(__m512d);
+
+/// Result of comparisons of [`F64x8`], one bit a lane.
+#[derive(Debug, Clone, Copy)]
+pub struct Mask8(__mmask8);
+
+macro_rules! operator {
+    ($trait:ident, $name:ident, $intrinsic:ident) => {
+        impl $trait for F64x8 {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: the processor has AVX-512 (head of this file).
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+operator!(Add, add, _mm512_add_pd);
+operator!(Sub, sub, _mm512_sub_pd);
+operator!(Mul, mul, _mm512_mul_pd);
+operator!(Div, div, _mm512_div_pd);
+
+impl Neg for F64x8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file). Flips the sign bit, as scalar negation.
+        unsafe {
+            let sign = _mm512_set1_epi64(i64::MIN);
+            Self(_mm512_castsi512_pd(_mm512_xor_si512(_mm512_castpd_si512(self.0), sign)))
+        }
+    }
+}
+
+impl BitAnd for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl BitOr for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl Not for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Self(!self.0)
+    }
+}
+
+/// Transposes the 4 × 4 blocks in the lower and the upper halves of four registers.
+///
+/// # Safety
+/// The processor has AVX-512 F.
+#[inline(always)]
+unsafe fn transpose(rows: [__m512d; 4]) -> [__m512d; 4] {
+    // SAFETY: as the function's.
+    unsafe {
+        let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+        let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+        let even = [_mm512_unpacklo_pd(rows[0], rows[1]), _mm512_unpacklo_pd(rows[2], rows[3])];
+        let odd = [_mm512_unpackhi_pd(rows[0], rows[1]), _mm512_unpackhi_pd(rows[2], rows[3])];
+        [
+            _mm512_permutex2var_pd(even[0], low, even[1]),
+            _mm512_permutex2var_pd(odd[0], low, odd[1]),
+            _mm512_permutex2var_pd(even[0], high, even[1]),
+            _mm512_permutex2var_pd(odd[0], high, odd[1]),
+        ]
+    }
+}
+
+/// Four numbers of one row below four of another.
+///
+/// # Safety
+/// The processor has AVX-512 F; four numbers can be read at `from` of both rows.
+#[inline(always)]
+unsafe fn two_rows(low: *const f64, high: *const f64, from: usize) -> __m512d {
+    // SAFETY: as the function's.
+    unsafe {
+        let low = _mm512_castpd256_pd512(_mm256_loadu_pd(low.add(from)));
+        _mm512_insertf64x4::<1>(low, _mm256_loadu_pd(high.add(from)))
+    }
+}
+
+impl Lane for F64x8 {
+    type Mask = Mask8;
+    const WIDTH: usize = 8;
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Self(unsafe { _mm512_set1_pd(value) })
+    }
+    #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        let values = &values[..8];
+        // SAFETY: the processor has AVX-512 (head of this file); the slice holds eight numbers.
+        Self(unsafe { _mm512_loadu_pd(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64]) {
+        let values = &mut values[..8];
+        // SAFETY: the processor has AVX-512 (head of this file); the slice holds eight numbers.
+        unsafe { _mm512_storeu_pd(values.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Self(unsafe { _mm512_sqrt_pd(self.0) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file). The instruction gives the second operand
+        // unless the first is greater.
+        Self(unsafe { _mm512_max_pd(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as `max`, with less.
+        Self(unsafe { _mm512_min_pd(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn less(self, other: Self) -> Mask8 {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Mask8(unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn greater(self, other: Self) -> Mask8 {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Mask8(unsafe { _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn at_least(self, other: Self) -> Mask8 {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Mask8(unsafe { _mm512_cmp_pd_mask::<_CMP_GE_OQ>(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, yes: Self, no: Self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Self(unsafe { _mm512_mask_blend_pd(mask.0, no.0, yes.0) })
+    }
+    #[inline(always)]
+    fn any(mask: Mask8) -> bool {
+        mask.0 != 0
+    }
+    #[inline(always)]
+    fn lane(mask: Mask8, lane: usize) -> bool {
+        mask.0 >> lane & 1 == 1
+    }
+    #[inline(always)]
+    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
+        let index = &index[..8];
+        let row: [*const f64; 8] = std::array::from_fn(|k| (&raw const records[index[k] as usize]).cast());
+        let mut columns = [Self::splat(0.0); RECORD];
+        for group in 0..RECORD / 4 {
+            // SAFETY: the processor has AVX-512 (head of this file); each row points at the twelve numbers of
+            // a record, of which four are read from 4·group on.
+            let [x, y, z, w] = unsafe {
+                transpose([
+                    two_rows(row[0], row[4], 4 * group),
+                    two_rows(row[1], row[5], 4 * group),
+                    two_rows(row[2], row[6], 4 * group),
+                    two_rows(row[3], row[7], 4 * group),
+                ])
+            };
+            columns[4 * group] = Self(x);
+            columns[4 * group + 1] = Self(y);
+            columns[4 * group + 2] = Self(z);
+            columns[4 * group + 3] = Self(w);
+        }
+        columns
+    }
+    #[inline(always)]
+    fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {
+        assert!(rows.len() >= 7 * stride + offset + 4);
+        let start = rows.as_mut_ptr();
+        // SAFETY: the processor has AVX-512 (head of this file); the last of the four numbers written per
+        // row, at 7·stride + offset + 3, lies inside the slice.
+        unsafe {
+            let lines = transpose([values[0].0, values[1].0, values[2].0, values[3].0]);
+            for k in 0..4 {
+                _mm256_storeu_pd(start.add(k * stride + offset), _mm512_castpd512_pd256(lines[k]));
+                _mm256_storeu_pd(start.add((k + 4) * stride + offset), _mm512_extractf64x4_pd::<1>(lines[k]));
+            }
+        }
+    }
+    #[inline(always)]
+    fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {
+        let codes: &[u16; 8] = codes[..8].try_into().expect("eight codes");
+        // SAFETY: the processor has AVX-512 (head of this file); table and codes hold eight entries each. The
+        // instruction uses the lowest three bits of each index.
+        unsafe {
+            let wide = _mm512_cvtepu16_epi64(_mm_loadu_si128(codes.as_ptr().cast()));
+            let index = _mm512_srl_epi64(wide, _mm_cvtsi32_si128(bits.cast_signed()));
+            Self(_mm512_permutexvar_pd(index, _mm512_loadu_pd(table.as_ptr())))
+        }
+    }
+    #[inline(always)]
+    fn prefetch(records: &[Record], index: &[u32]) {
+        super::avx2::prefetch(records, &index[..8]);
+    }
+}
