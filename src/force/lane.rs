@@ -7,10 +7,9 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 pub mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub mod avx512;
-#[cfg(test)]
 pub mod portable;
 
-/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, mass.
+/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, 1/I.
 pub const RECORD: usize = size_of::<Record>() / size_of::<f64>();
 
 /// One or several `f64` side by side. Every operation is the IEEE one per lane, so that any width

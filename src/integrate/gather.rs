@@ -2,15 +2,16 @@
 //! that every rank and thread count gives the same bits.
 
 use crate::contact::list::End;
+use crate::force::lane::Lane;
 use crate::force::observe::CONTACT_LEDGER;
 
-/// Force \[N\] and torque \[N m\] on a particle.
+/// Force \[N\] and torque \[N m\] on a particle in the first three of four lanes; the fourth means nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
+pub struct Load<L> {
     /// Force.
-    pub force: [f64; 3],
+    pub force: L,
     /// Torque about the centre.
-    pub torque: [f64; 3],
+    pub torque: L,
 }
 
 /// Output lines of the contact passes as the particles of one strip see them.
@@ -41,54 +42,31 @@ impl Lines<'_> {
         values[start..start + N].try_into().expect("a slice of N numbers")
     }
 
-    /// Sum over the contacts of one particle, given its ends.
+    /// Sum over the contacts of one particle, given its ends, in lanes four wide.
     #[inline(always)]
     #[must_use]
-    pub fn load(&self, ends: &[End]) -> Load {
+    pub fn load<L: Lane>(&self, ends: &[End]) -> Load<L> {
         match self.width {
-            4 => self.forces(ends),
-            8 => self.forces_and_torques(ends),
-            _ => self.with_moments(ends),
+            4 => self.sum::<L, 4>(ends),
+            8 => self.sum::<L, 8>(ends),
+            _ => self.sum::<L, 12>(ends),
         }
     }
 
     #[inline(always)]
-    fn forces(&self, ends: &[End]) -> Load {
-        let mut sum = [0.0; 4];
+    fn sum<L: Lane, const WIDTH: usize>(&self, ends: &[End]) -> Load<L> {
+        const SIGN: [f64; 2] = [1.0, -1.0];
+        let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
         for end in ends {
-            let line = self.part::<4>(end.line(), 0);
-            let sign = if end.is_second() { -1.0 } else { 1.0 };
-            for k in 0..4 {
-                sum[k] += sign * line[k];
+            let line = self.part::<WIDTH>(end.line(), 0);
+            let sign = L::splat(SIGN[usize::from(end.is_second())]);
+            force = force + sign * L::load(&line[..4]);
+            if WIDTH >= 8 {
+                let arm = line[3 + 4 * usize::from(end.is_second())];
+                torque = torque + L::splat(arm) * L::load(&line[4..8]);
             }
-        }
-        Load { force: [sum[0], sum[1], sum[2]], torque: [0.0; 3] }
-    }
-
-    #[inline(always)]
-    fn forces_and_torques(&self, ends: &[End]) -> Load {
-        let mut sum = [0.0; 8];
-        for end in ends {
-            let line = self.part::<8>(end.line(), 0);
-            let (sign, arm) = if end.is_second() { (-1.0, line[7]) } else { (1.0, line[3]) };
-            let factor = [sign, sign, sign, sign, arm, arm, arm, arm];
-            for k in 0..8 {
-                sum[k] += factor[k] * line[k];
-            }
-        }
-        Load { force: [sum[0], sum[1], sum[2]], torque: [sum[4], sum[5], sum[6]] }
-    }
-
-    #[inline(always)]
-    fn with_moments(&self, ends: &[End]) -> Load {
-        let Load { force, .. } = self.forces(ends);
-        let mut torque = [0.0; 3];
-        for end in ends {
-            let line = self.part::<12>(end.line(), 0);
-            let (sign, arm) = if end.is_second() { (-1.0, line[7]) } else { (1.0, line[3]) };
-            for k in 0..3 {
-                torque[k] += arm * line[4 + k];
-                torque[k] += sign * line[8 + k];
+            if WIDTH >= 12 {
+                torque = torque + sign * L::load(&line[8..12]);
             }
         }
         Load { force, torque }

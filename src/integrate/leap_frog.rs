@@ -3,11 +3,15 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
-use super::gather::Lines;
+use super::gather::{Lines, Load};
 use crate::contact::list::End;
+#[cfg(target_arch = "x86_64")]
+use crate::force::lane::avx2::F64x4;
+use crate::force::lane::portable::Portable;
+use crate::force::lane::{Lane, RECORD};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
-use crate::state::particles::{Particles, Record, synchronised};
+use crate::state::particles::{Particles, Record, padded, trimmed};
 use std::ops::Range;
 
 /// What is the same for all particles in one step.
@@ -70,11 +74,11 @@ pub struct Slice<'a> {
     /// Their records.
     pub record: &'a mut [Record],
     image: &'a mut [[i32; 3]],
-    velocity: &'a mut [[f64; 3]],
-    spin: &'a mut [[f64; 3]],
+    velocity: &'a mut [[f64; 4]],
+    spin: &'a mut [[f64; 4]],
     orientation: &'a mut [[f64; 4]],
     ledger: &'a mut [[f64; LEDGER.len()]],
-    reference: &'a [[f64; 3]],
+    reference: &'a [[f64; 4]],
     crossed: &'a mut [[i8; 4]],
 }
 
@@ -125,8 +129,8 @@ impl<'a> Slice<'a> {
 /// Positions at the last list rebuild and the images crossed since the last Verlet list.
 #[derive(Debug, Clone, Default)]
 pub struct Reference {
-    /// Positions then, unwrapped back to the last Verlet list \[m\].
-    pub position: Vec<[f64; 3]>,
+    /// Positions then, unwrapped back to the last Verlet list \[m\]; the fourth number is 0.
+    pub position: Vec<[f64; 4]>,
     /// Images crossed since the last Verlet list, of owned particles and ghosts; the fourth is 0.
     pub crossed: Vec<[i8; 4]>,
 }
@@ -142,8 +146,9 @@ impl Reference {
     pub fn take(&mut self, particles: &Particles, sides: [f64; 3]) {
         let now = particles.record[..particles.owned].iter().zip(&self.crossed);
         self.position.clear();
-        self.position
-            .extend(now.map(|(r, crossed)| [0, 1, 2].map(|k| r.position[k] + f64::from(crossed[k]) * sides[k])));
+        self.position.extend(
+            now.map(|(r, crossed)| padded([0, 1, 2].map(|k| r.position[k] + f64::from(crossed[k]) * sides[k]))),
+        );
     }
 
     /// A particle crossed periodic faces.
@@ -175,7 +180,7 @@ pub fn advance(
         Simd::Avx2 => unsafe { advance_avx2(slice, range, offsets, ends, lines, motion, result) },
         #[cfg(target_arch = "x86_64")]
         Simd::Avx512 => unsafe { advance_avx512(slice, range, offsets, ends, lines, motion, result) },
-        _ => advance_range(slice, range, offsets, ends, lines, motion, result),
+        _ => advance_range::<Portable<4>>(slice, range, offsets, ends, lines, motion, result),
     }
 }
 
@@ -190,7 +195,7 @@ fn advance_avx2(
     motion: &StepMotion,
     result: &mut StepResult,
 ) {
-    advance_range(slice, range, offsets, ends, lines, motion, result);
+    advance_range::<F64x4>(slice, range, offsets, ends, lines, motion, result);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -204,11 +209,13 @@ fn advance_avx512(
     motion: &StepMotion,
     result: &mut StepResult,
 ) {
-    advance_range(slice, range, offsets, ends, lines, motion, result);
+    advance_range::<F64x4>(slice, range, offsets, ends, lines, motion, result);
 }
 
+/// The motion, a particle at a time in lanes (x, y, z, not used). The position shares its lanes with the
+/// radius, which the constants of the fourth lane leave as it is.
 #[inline(always)]
-fn advance_range(
+fn advance_range<L: Lane>(
     slice: &mut Slice,
     range: Range<usize>,
     offsets: &[u32],
@@ -217,52 +224,61 @@ fn advance_range(
     motion: &StepMotion,
     result: &mut StepResult,
 ) {
+    const { assert!(L::WIDTH == 4) };
+    let zero = L::splat(0.0);
+    let three = |v: [f64; 3], fourth: f64| L::load(&[v[0], v[1], v[2], fourth]);
+    let vector = three([1.0; 3], 0.0).greater(zero);
     let (old, new) = (motion.previous_time_step, motion.time_step);
-    let kick = 0.5 * (old + new);
-    let drift = [0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new);
-    let stretch = [0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]);
+    let (kick, half) = (L::splat(0.5 * (old + new)), L::splat(0.5 * new));
+    let drift = three([0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new), 0.0);
+    let scale = three(motion.scale, 1.0);
+    let gravity = three(motion.gravity, 0.0);
+    let sides = three(motion.sides, f64::INFINITY);
+    let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
     for index in range {
         let particle = slice.start + index;
         let ends = &ends[offsets[particle] as usize..offsets[particle + 1] as usize];
-        let load = lines.load(ends);
-        let record = &mut slice.record[index];
-        let free = record.inverse_mass > 0.0;
-        let mut acceleration = load.force.map(|f| f * record.inverse_mass);
-        if free {
-            for k in 0..3 {
-                acceleration[k] += motion.gravity[k];
-            }
-        }
+        let load = lines.load::<L>(ends);
+        let inverse_mass = L::splat(slice.record[index].inverse_mass);
+        let free = inverse_mass.greater(zero);
         if motion.ledger {
             lines.add_ledger(ends, &mut slice.ledger[index]);
-            add_external_work(&mut slice.ledger[index], record, load.force, load.torque, motion, free);
+            add_external_work(&mut slice.ledger[index], &slice.record[index], &load, motion);
         }
-        let velocity = &mut slice.velocity[index];
-        for k in 0..3 {
-            velocity[k] += kick * acceleration[k];
-            record.position[k] = motion.scale[k] * record.position[k] + drift[k] * velocity[k];
-        }
+        let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
+        let pull = L::select(free, gravity, zero);
+        let acceleration = L::select(vector, load.force * inverse_mass, zero) + pull;
+        let mut velocity = L::load(&slice.velocity[index]) + kick * acceleration;
+        let mut position = scale * L::load(&record[..4]) + drift * velocity;
         if motion.rotation {
-            let inverse_inertia = 2.5 * record.inverse_mass / (record.radius * record.radius);
-            let angular = load.torque.map(|t| t * inverse_inertia);
-            let spin = &mut slice.spin[index];
-            for k in 0..3 {
-                spin[k] += kick * angular[k];
-            }
-            record.spin = synchronised(*spin, angular, new);
+            let angular = L::select(vector, load.torque * L::splat(record[11]), zero);
+            let spin = L::load(&slice.spin[index]) + kick * angular;
+            spin.store(&mut slice.spin[index]);
+            let mut full = [0.0; 4];
+            (spin + half * angular).store(&mut full);
+            record[8..11].copy_from_slice(&full[..3]);
             if motion.orientation {
-                slice.orientation[index] = turned(slice.orientation[index], *spin, new);
+                slice.orientation[index] = turned(slice.orientation[index], trimmed(slice.spin[index]), new);
             }
         }
-        wrap(slice, index, motion, result);
-        let record = &mut slice.record[index];
-        record.velocity = synchronised(slice.velocity[index], acceleration, new);
-        let mut squared = 0.0;
-        for k in 0..3 {
-            let unwrapped = record.position[k] + f64::from(slice.crossed[index][k]) * motion.sides[k];
-            let moved = unwrapped - stretch[k] * slice.reference[index][k];
-            squared += moved * moved;
+        position.store(&mut record[..4]);
+        if L::any(zero.greater(position) | position.at_least(sides)) {
+            velocity.store(&mut slice.velocity[index]);
+            wrap(slice, index, motion, result);
+            velocity = L::load(&slice.velocity[index]);
+            position = L::load(&bytemuck::cast_ref::<_, [f64; RECORD]>(&slice.record[index])[..4]);
         }
+        velocity.store(&mut slice.velocity[index]);
+        let mut full = [0.0; 4];
+        (velocity + half * acceleration).store(&mut full);
+        slice.record[index].velocity = trimmed(full);
+        let [x, y, z, _] = slice.crossed[index];
+        let crossed = three([x, y, z].map(f64::from), 0.0);
+        let unwrapped = position + L::select(vector, crossed * sides, zero);
+        let moved = L::select(vector, unwrapped - stretch * L::load(&slice.reference[index]), zero);
+        let mut squares = [0.0; 4];
+        (moved * moved).store(&mut squares);
+        let squared = squares[0] + squares[1] + squares[2];
         if squared > result.max_displacement_squared {
             result.max_displacement_squared = squared;
         }
@@ -327,19 +343,15 @@ pub fn wrapped(x: f64, side: f64) -> (f64, i32) {
 
 /// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
 #[inline(always)]
-fn add_external_work(
-    ledger: &mut [f64; LEDGER.len()],
-    record: &Record,
-    force: [f64; 3],
-    torque: [f64; 3],
-    motion: &StepMotion,
-    free: bool,
-) {
+fn add_external_work<L: Lane>(ledger: &mut [f64; LEDGER.len()], record: &Record, load: &Load<L>, motion: &StepMotion) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    if free {
-        ledger[1] += record.mass * dot(motion.gravity, record.velocity) * motion.time_step;
+    if record.inverse_mass > 0.0 {
+        ledger[1] += dot(motion.gravity, record.velocity) / record.inverse_mass * motion.time_step;
     } else {
-        ledger[2] -= (dot(force, record.velocity) + dot(torque, record.spin)) * motion.time_step;
+        let (mut force, mut torque) = ([0.0; 4], [0.0; 4]);
+        load.force.store(&mut force);
+        load.torque.store(&mut torque);
+        ledger[2] -= (dot(trimmed(force), record.velocity) + dot(trimmed(torque), record.spin)) * motion.time_step;
     }
 }
 

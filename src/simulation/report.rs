@@ -8,6 +8,7 @@ use crate::force::observe::{Observation, SUMS, Sample, Sum, Wanted};
 use crate::integrate::time_step::Measured;
 use crate::output::history::HistoryRow;
 use crate::state::LEDGER;
+use crate::state::particles::sphere_mass;
 
 /// Particles with fewer contacts than this carry no load in three dimensions (rattlers).
 const RATTLER_CONTACTS: u32 = 4;
@@ -114,10 +115,11 @@ impl Simulation {
             if !wanted.sums {
                 continue;
             }
-            let inertia = 0.4 * record.mass * (record.radius * record.radius);
-            sums[ParticleSum::Kinetic as usize].add(0.5 * (record.mass * squared + inertia * dot(record.spin)));
+            let mass = self.mass(index);
+            let inertia = 0.4 * mass * (record.radius * record.radius);
+            sums[ParticleSum::Kinetic as usize].add(0.5 * (mass * squared + inertia * dot(record.spin)));
             for k in 0..3 {
-                sums[ParticleSum::KineticStress as usize + k].add(record.mass * (velocity[k] * velocity[k]));
+                sums[ParticleSum::KineticStress as usize + k].add(mass * (velocity[k] * velocity[k]));
             }
             if record.inverse_mass > 0.0 {
                 sums[ParticleSum::Free as usize].add(1.0);
@@ -148,9 +150,14 @@ impl Simulation {
         self.contacts.ends_of(particle).iter().filter(|end| self.forces[end.line()][3] > 0.0).count() as u32
     }
 
+    fn mass(&self, particle: usize) -> f64 {
+        let species = self.model.species[self.particles.species[particle] as usize];
+        sphere_mass(self.particles.record[particle].radius, species.density)
+    }
+
     /// Sum of all forces on an owned particle at the last look at single contacts \[N\].
     fn net_force(&self, particle: usize) -> [f64; 3] {
-        let mass = self.particles.record[particle].mass;
+        let mass = self.mass(particle);
         let mut sum = self.model.config.gravity.map(|g| mass * g);
         for end in self.contacts.ends_of(particle) {
             let sign = if end.is_second() { -1.0 } else { 1.0 };

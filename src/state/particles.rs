@@ -18,8 +18,8 @@ pub struct Record {
     pub inverse_mass: f64,
     /// Angular velocity at the full step \[rad/s\].
     pub spin: [f64; 3],
-    /// Mass \[kg\].
-    pub mass: f64,
+    /// 1/I, I = 2/5 m R² \[1/(kg m²)\]; 0 for driven particles.
+    pub inverse_inertia: f64,
 }
 
 /// What is constant over all particles of a species.
@@ -44,10 +44,10 @@ pub struct Particles {
     pub record: Vec<Record>,
     /// Periodic images crossed since the start (all).
     pub image: Vec<[i32; 3]>,
-    /// Velocity at the last half step.
-    pub velocity: Vec<[f64; 3]>,
-    /// Angular velocity at the last half step.
-    pub spin: Vec<[f64; 3]>,
+    /// Velocity at the last half step; the fourth number is 0.
+    pub velocity: Vec<[f64; 4]>,
+    /// Angular velocity at the last half step; the fourth number is 0.
+    pub spin: Vec<[f64; 4]>,
     /// Orientation, unit quaternion (w, x, y, z); empty where orientations are not followed.
     pub orientation: Vec<[f64; 4]>,
     /// Energy ledger per particle; empty when the ledger is off.
@@ -73,8 +73,8 @@ impl Particles {
             particles.id.push(state.id);
             particles.species.push(state.species);
             particles.image.push(state.image);
-            particles.velocity.push(state.velocity);
-            particles.spin.push(state.spin);
+            particles.velocity.push(padded(state.velocity));
+            particles.spin.push(padded(state.spin));
             if extras.orientation {
                 particles.orientation.push(state.orientation);
             }
@@ -88,7 +88,7 @@ impl Particles {
                 velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
                 spin: state.full_spin,
-                mass,
+                inverse_inertia: if constants.driven { 0.0 } else { 2.5 / (mass * state.radius * state.radius) },
             });
         }
         particles
@@ -103,9 +103,9 @@ impl Particles {
             species: self.species[index],
             position: record.position,
             radius: record.radius,
-            velocity: self.velocity[index],
+            velocity: trimmed(self.velocity[index]),
             full_velocity: record.velocity,
-            spin: self.spin[index],
+            spin: trimmed(self.spin[index]),
             full_spin: record.spin,
             orientation: self.orientation.get(index).copied().unwrap_or([1.0, 0.0, 0.0, 0.0]),
             ledger: self.ledger.get(index).copied().unwrap_or_default(),
@@ -165,10 +165,14 @@ pub fn sphere_mass(radius: f64, density: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * radius * radius * radius * density
 }
 
-/// Velocity at the full step, `v_t = v_{t−Δt/2} + ½ a Δt` (W 2.3).
-#[inline(always)]
+/// With a fourth number, 0.
 #[must_use]
-pub fn synchronised(half_step: [f64; 3], acceleration: [f64; 3], time_step: f64) -> [f64; 3] {
-    let half = 0.5 * time_step;
-    [0, 1, 2].map(|k| half_step[k] + half * acceleration[k])
+pub fn padded(vector: [f64; 3]) -> [f64; 4] {
+    [vector[0], vector[1], vector[2], 0.0]
+}
+
+/// Without the fourth number.
+#[must_use]
+pub fn trimmed(vector: [f64; 4]) -> [f64; 3] {
+    [vector[0], vector[1], vector[2]]
 }

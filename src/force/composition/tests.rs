@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::config::MaxwellBranch;
-use crate::force::lane::Portable8;
+use crate::force::lane::portable::Portable;
+
+type Portable8 = Portable<8>;
 use crate::force::registry::{LawChoice, ParameterKind, ParameterValue, Role, laws};
 use crate::force::testing::{choice, pair, properties};
 use proptest::prelude::*;
@@ -83,7 +85,7 @@ fn touch(n: &[f64; 15]) -> Touch<f64> {
 }
 
 fn gather(touches: &[Touch<f64>]) -> Touch<Portable8> {
-    let lanes = |f: &dyn Fn(&Touch<f64>) -> f64| Portable8(std::array::from_fn(|k| f(&touches[k])));
+    let lanes = |f: &dyn Fn(&Touch<f64>) -> f64| Portable(std::array::from_fn(|k| f(&touches[k])));
     let vector = |f: &dyn Fn(&Touch<f64>) -> [f64; 3]| std::array::from_fn(|c| lanes(&|t| f(t)[c]));
     Touch {
         overlap: lanes(&|t| t.overlap),

@@ -70,6 +70,12 @@ unsafe fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
     }
 }
 
+/// Where the numbers of a record begin.
+#[inline(always)]
+pub fn address(records: &[Record], index: u32) -> *const f64 {
+    (&raw const records[index as usize]).cast()
+}
+
 /// Ask for both cache lines of some records.
 #[inline(always)]
 pub fn prefetch(records: &[Record], index: &[u32]) {
@@ -152,7 +158,12 @@ impl Lane for F64x4 {
     #[inline(always)]
     fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
         let index = &index[..4];
-        let row: [*const f64; 4] = std::array::from_fn(|k| (&raw const records[index[k] as usize]).cast());
+        let row = [
+            address(records, index[0]),
+            address(records, index[1]),
+            address(records, index[2]),
+            address(records, index[3]),
+        ];
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX2 (head of this file); each row points at the twelve numbers of a

@@ -3,6 +3,7 @@
 //! Every function compiles to instructions that need AVX-512 F and VL: they run only inside the pass that
 //! [`super::super::simd`] has chosen after asking the processor, and are inlined there.
 
+use super::avx2::address;
 use super::{Lane, RECORD};
 use crate::state::particles::Record;
 use std::arch::x86_64::*;
@@ -170,7 +171,16 @@ impl Lane for F64x8 {
     #[inline(always)]
     fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
         let index = &index[..8];
-        let row: [*const f64; 8] = std::array::from_fn(|k| (&raw const records[index[k] as usize]).cast());
+        let row = [
+            address(records, index[0]),
+            address(records, index[1]),
+            address(records, index[2]),
+            address(records, index[3]),
+            address(records, index[4]),
+            address(records, index[5]),
+            address(records, index[6]),
+            address(records, index[7]),
+        ];
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX-512 (head of this file); each row points at the twelve numbers of

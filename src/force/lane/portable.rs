@@ -1,30 +1,29 @@
-//! Eight lanes in plain loops: the reference that any machine can run in tests.
+//! Lanes in plain loops: what a processor without vector instructions runs, and the reference in tests.
 
 use super::{Lane, RECORD};
 use crate::state::particles::Record;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-/// Eight `f64` side by side in plain loops: no intrinsics, so it runs anywhere, and it proves in tests
-/// that a law written over [`Lane`] gives each lane the scalar bits.
+/// `N` numbers side by side; no intrinsics, so it runs anywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Portable8(pub [f64; 8]);
+pub struct Portable<const N: usize>(pub [f64; N]);
 
-/// Result of comparisons of [`Portable8`].
+/// Result of comparisons of [`Portable`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PortableMask8(pub [bool; 8]);
+pub struct PortableMask<const N: usize>(pub [bool; N]);
 
-impl Portable8 {
+impl<const N: usize> Portable<N> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
     }
     #[inline(always)]
-    fn compare(self, other: Self, f: impl Fn(f64, f64) -> bool) -> PortableMask8 {
-        PortableMask8(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    fn compare(self, other: Self, f: impl Fn(f64, f64) -> bool) -> PortableMask<N> {
+        PortableMask(std::array::from_fn(|k| f(self.0[k], other.0[k])))
     }
 }
 
-impl Add for Portable8 {
+impl<const N: usize> Add for Portable<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -32,7 +31,7 @@ impl Add for Portable8 {
     }
 }
 
-impl Sub for Portable8 {
+impl<const N: usize> Sub for Portable<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -40,7 +39,7 @@ impl Sub for Portable8 {
     }
 }
 
-impl Mul for Portable8 {
+impl<const N: usize> Mul for Portable<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -48,7 +47,7 @@ impl Mul for Portable8 {
     }
 }
 
-impl Div for Portable8 {
+impl<const N: usize> Div for Portable<N> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -56,7 +55,7 @@ impl Div for Portable8 {
     }
 }
 
-impl Neg for Portable8 {
+impl<const N: usize> Neg for Portable<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -64,7 +63,7 @@ impl Neg for Portable8 {
     }
 }
 
-impl BitAnd for PortableMask8 {
+impl<const N: usize> BitAnd for PortableMask<N> {
     type Output = Self;
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
@@ -72,7 +71,7 @@ impl BitAnd for PortableMask8 {
     }
 }
 
-impl BitOr for PortableMask8 {
+impl<const N: usize> BitOr for PortableMask<N> {
     type Output = Self;
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
@@ -80,7 +79,7 @@ impl BitOr for PortableMask8 {
     }
 }
 
-impl Not for PortableMask8 {
+impl<const N: usize> Not for PortableMask<N> {
     type Output = Self;
     #[inline(always)]
     fn not(self) -> Self {
@@ -88,21 +87,21 @@ impl Not for PortableMask8 {
     }
 }
 
-impl Lane for Portable8 {
-    type Mask = PortableMask8;
-    const WIDTH: usize = 8;
+impl<const N: usize> Lane for Portable<N> {
+    type Mask = PortableMask<N>;
+    const WIDTH: usize = N;
     #[inline(always)]
     fn splat(value: f64) -> Self {
-        Self([value; 8])
+        Self([value; N])
     }
     #[inline(always)]
     fn load(values: &[f64]) -> Self {
-        let values = &values[..8];
+        let values = &values[..N];
         Self(std::array::from_fn(|k| values[k]))
     }
     #[inline(always)]
     fn store(self, values: &mut [f64]) {
-        values[..8].copy_from_slice(&self.0);
+        values[..N].copy_from_slice(&self.0);
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -117,37 +116,37 @@ impl Lane for Portable8 {
         self.zip(other, |a, b| if a < b { a } else { b })
     }
     #[inline(always)]
-    fn less(self, other: Self) -> PortableMask8 {
+    fn less(self, other: Self) -> PortableMask<N> {
         self.compare(other, |a, b| a < b)
     }
     #[inline(always)]
-    fn greater(self, other: Self) -> PortableMask8 {
+    fn greater(self, other: Self) -> PortableMask<N> {
         self.compare(other, |a, b| a > b)
     }
     #[inline(always)]
-    fn select(mask: PortableMask8, yes: Self, no: Self) -> Self {
+    fn select(mask: PortableMask<N>, yes: Self, no: Self) -> Self {
         Self(std::array::from_fn(|k| if mask.0[k] { yes.0[k] } else { no.0[k] }))
     }
     #[inline(always)]
-    fn at_least(self, other: Self) -> PortableMask8 {
+    fn at_least(self, other: Self) -> PortableMask<N> {
         self.compare(other, |a, b| a >= b)
     }
     #[inline(always)]
-    fn any(mask: PortableMask8) -> bool {
+    fn any(mask: PortableMask<N>) -> bool {
         mask.0.contains(&true)
     }
     #[inline(always)]
-    fn lane(mask: PortableMask8, lane: usize) -> bool {
+    fn lane(mask: PortableMask<N>, lane: usize) -> bool {
         mask.0[lane]
     }
     #[inline(always)]
     fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
-        let rows: [[f64; RECORD]; 8] = std::array::from_fn(|k| bytemuck::cast(records[index[k] as usize]));
+        let rows: [[f64; RECORD]; N] = std::array::from_fn(|k| bytemuck::cast(records[index[k] as usize]));
         std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {
-        for k in 0..8 {
+        for k in 0..N {
             rows[k * stride + offset..][..4].copy_from_slice(&values.map(|v| v.0[k]));
         }
     }
