@@ -237,7 +237,6 @@ impl<C: ContactLaw> LawPass<C> {
                 let (lane, place) = (part * L::WIDTH, block * BLOCK + part * L::WIDTH);
                 let ahead = place + PREFETCH * BLOCK;
                 if ahead + L::WIDTH <= last {
-                    L::prefetch(records, &section.first[ahead..ahead + L::WIDTH]);
                     L::prefetch(records, &section.second[ahead..ahead + L::WIDTH]);
                 }
                 let a = Bodies::<L>::gather(records, &section.first[place..place + L::WIDTH]);
