@@ -7,6 +7,7 @@ mod lists;
 mod report;
 mod snapshot;
 mod timers;
+mod traffic;
 
 pub use report::Report;
 pub use timers::{STAGES, Stage, Timers};
