@@ -12,6 +12,7 @@ pub struct Efforts {
     snapshots: Effort,
     checkpoints: Effort,
     bytes_before: u64,
+    peak_of_setup: u64,
 }
 
 impl Efforts {
@@ -22,6 +23,7 @@ impl Efforts {
             snapshots: Effort::default(),
             checkpoints: Effort::default(),
             bytes_before: resident_bytes(),
+            peak_of_setup: 0,
         }
     }
 
@@ -35,6 +37,7 @@ impl Efforts {
         self.set_up("distribution", report.distribution);
         self.set_up("overlap check", report.check);
         self.set_up("first lists", report.lists);
+        self.peak_of_setup = peak_bytes();
     }
 
     /// A snapshot was written, perhaps with the file of its contacts.
@@ -56,15 +59,16 @@ impl Efforts {
     }
 
     /// Rows of the table over ranks.
-    pub fn per_rank(&self, simulation: &Simulation) -> [RankRow; 5] {
+    pub fn per_rank(&self, simulation: &Simulation) -> [RankRow; 6] {
         let (found, model) = (simulation.traffic(), simulation.expected_traffic());
         let row = |name, value, expected| RankRow { name, value, expected };
         [
             row("ghosts", found.ghosts, Some(model.ghosts)),
             row("messages per step", found.messages, Some(model.messages)),
             row("bytes per step", found.bytes, Some(model.bytes)),
-            row("peak kB", (peak_bytes() / 1000) as f64, None),
             row("kB before set-up", (self.bytes_before / 1000) as f64, None),
+            row("peak kB of set-up", (self.peak_of_setup / 1000) as f64, None),
+            row("peak kB of run", (peak_bytes() / 1000) as f64, None),
         ]
     }
 }
