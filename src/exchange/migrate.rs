@@ -314,8 +314,10 @@ pub fn distribute(
             push_row(&mut parcels[to as usize].rows, key, memory.row(index));
         }
     }
-    let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
+    // Each copy of the particles goes as soon as the next one stands.
+    let received = comm.all_to_all(parcels.into_iter().map(|parcel| parcel.to_bytes()).collect());
     let arriving = Parcel::from_bytes(&received, memory.width);
+    drop(received);
     let particles = Particles::from_states(&arriving.states, setting.species, setting.time_step);
     let mut owned_memory = ContactMemory::new(memory.width);
     agree(comm, merge_rows(&mut owned_memory, &arriving.rows, setting.step))?;
