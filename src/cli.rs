@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
 use crate::output::{checkpoint, plot};
 use crate::run::{self, Outcome, RunOptions};
+use crate::scaling::{self, ScalingOptions};
 use crate::verify;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -78,6 +79,8 @@ enum Command {
     },
     /// Measure speed: particle-steps/s on a jammed periodic packing.
     Bench(BenchOptions),
+    /// Predict the parallel efficiency on many ranks from the communication model.
+    Scaling(ScalingOptions),
     /// Run cases with a known answer and compare: claim, expected, got.
     Verify {
         /// Only cases with this in their name.
@@ -124,6 +127,7 @@ pub fn main() -> i32 {
             }
         }),
         Command::Bench(options) => bench::main(&options),
+        Command::Scaling(options) => scaling::main(&options),
         Command::Verify { filter } => return verify::main(filter.as_deref()),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
     };

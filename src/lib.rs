@@ -14,6 +14,7 @@ pub mod neighbour;
 pub mod output;
 pub mod packing;
 pub mod run;
+pub mod scaling;
 pub mod setup;
 pub mod simulation;
 pub mod state;

@@ -1,5 +1,6 @@
 //! A run from input to final digest: outer loop over steps, what is written when, signals, restart.
 
+mod efforts;
 mod output;
 mod signals;
 
@@ -11,7 +12,8 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
-pub use output::resident_bytes;
+use efforts::Efforts;
+pub use efforts::{peak_bytes, resident_bytes};
 use output::{RunOutput, is_due};
 use signals::Signals;
 use std::path::{Path, PathBuf};
@@ -44,10 +46,13 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     // First of all, and on idle ranks too: mpirun forwards signals to every rank, and an unheard one kills.
     let signals = agree(comm, Signals::listen())?;
     let threads = set_up_threads(comm, config);
+    let mut efforts = Efforts::begin();
+    let started = Instant::now();
     let (initial, checkpoint) = match &options.restart {
         Some(path) => from_checkpoint(comm, config, path).map(|(initial, file)| (initial, Some(file)))?,
         None => (setup::from_packing(comm, config)?, None),
     };
+    efforts.set_up(if checkpoint.is_some() { "checkpoint read" } else { "packing" }, started.elapsed().as_secs_f64());
     let decomposition = agree(comm, setup::decomposition(comm, config, &initial.global))?;
     let ranks = decomposition.ranks();
     if ranks < comm.size() && comm.rank() == 0 {
@@ -65,8 +70,13 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     let prepared =
         if active.rank() == 0 { prepare(config, checkpoint.as_deref(), initial.global.step) } else { Ok(()) };
     agree(&active, prepared)?;
-    let simulation = setup::simulation(active, config, decomposition, initial, threads)?;
-    Run::new(simulation, Arc::clone(config), signals)?.drive()
+    let (simulation, report) = setup::timed_simulation(active, config, decomposition, initial, threads)?;
+    efforts.report(&report);
+    if let Some(worst) = report.overlap.filter(|_| simulation.comm().rank() == 0) {
+        let ([low, high], fraction) = (worst.ids, worst.fraction);
+        println!("packing: largest overlap {fraction:.4} of the smaller radius (particles {low} and {high})");
+    }
+    Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }
 
 /// Threads of this rank: as given, else the cores that this rank may use. Enters rayon's pool from the
@@ -126,8 +136,8 @@ struct Run {
 }
 
 impl Run {
-    fn new(simulation: Simulation, config: Arc<Config>, signals: Signals) -> Result<Self> {
-        let output = RunOutput::new(&simulation, &config)?;
+    fn new(simulation: Simulation, config: Arc<Config>, signals: Signals, efforts: Efforts) -> Result<Self> {
+        let output = RunOutput::new(&simulation, &config, efforts)?;
         let first_step = simulation.global().step;
         Ok(Self {
             simulation,
@@ -177,6 +187,7 @@ impl Run {
 
     fn checkpoint(&mut self) -> Result<PathBuf> {
         self.simulation.timers_mut().start(Stage::Output);
+        let started = Instant::now();
         let (particles, memory) = self.simulation.export()?;
         let columns = self.simulation.model().columns();
         let written = checkpoint::write(
@@ -191,7 +202,9 @@ impl Run {
         );
         self.simulation.timers_mut().stop();
         self.last_checkpoint = Instant::now();
-        written
+        let path = written?;
+        self.output.count_checkpoint(&path, started.elapsed().as_secs_f64());
+        Ok(path)
     }
 
     fn stop(mut self, signal: i32) -> Result<Outcome> {

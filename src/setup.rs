@@ -1,19 +1,25 @@
 //! From the checked input to a simulation ready to step: model, decomposition, packing or checkpoint.
 
-use crate::config::{Boundary, Config, Motion, ParallelConfig, TimeStepConfig};
+mod overlap;
+
+use crate::config::{Boundary, Config, Motion, ParallelConfig, Replication, TimeStepConfig};
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
-use crate::exchange::{Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum};
+use crate::exchange::{
+    Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum, redistribute,
+};
 use crate::force::pass;
 use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
 use crate::output::checkpoint::Checkpoint;
-use crate::packing;
+use crate::packing::{self, Packing, Worst};
 use crate::simulation::{Model, Simulation};
 use crate::state::particles::{SpeciesConstants, sphere_mass};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
+use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Particles spread over the ranks in any way, with what belongs to them.
 pub struct Initial {
@@ -35,7 +41,8 @@ struct Extremes {
     solid_volume: f64,
 }
 
-/// The packing as initial state, on rank 0; the others hold nothing yet.
+/// The packing as initial state. A packing that is neither replicated nor perturbed lies on rank 0, the
+/// others hold nothing yet; else rank 0 makes one copy, all ranks get it, and each makes its block of ids.
 ///
 /// # Errors
 /// The packing cannot be made; the same error on every rank.
@@ -50,8 +57,14 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         particles = packing.particles;
     }
     comm.broadcast(0, &mut header);
-    let sides: [f64; 3] = bytemuck::pod_read_unaligned(&header[..24]);
-    let count: u64 = bytemuck::pod_read_unaligned(&header[24..32]);
+    let mut sides: [f64; 3] = bytemuck::pod_read_unaligned(&header[..24]);
+    let mut count: u64 = bytemuck::pod_read_unaligned(&header[24..32]);
+    if config.replication != Replication::NONE {
+        let base = Packing { sides, particles: broadcast_states(comm, &particles) };
+        count = packing::replicate::total(config, base.particles.len())?;
+        particles = packing::replicate::share(config, &base, own_block(comm, count));
+        sides = config.replication.whole(sides);
+    }
     let mut global = GlobalState {
         step: 0,
         time: 0.0,
@@ -73,6 +86,19 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
     };
     programme(config).enter(&mut global);
     Ok(Initial { global, particles, memory: ContactMemory::new(0) })
+}
+
+/// The particles of rank 0 on every rank.
+fn broadcast_states(comm: &Communicator, states: &[ParticleState]) -> Vec<ParticleState> {
+    let mut bytes = bytemuck::cast_slice(states).to_vec();
+    comm.broadcast(0, &mut bytes);
+    bytemuck::pod_collect_to_vec(&bytes)
+}
+
+/// The ids that this rank begins with.
+fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
+    let start = |rank| redistribute::block_start(rank, total, comm.size());
+    start(comm.rank())..start(comm.rank() + 1)
 }
 
 /// A checkpoint as initial state.
@@ -227,17 +253,46 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
     }
 }
 
+/// What setting up took and found.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SetupReport {
+    /// Bringing particles and contact memory to their owners \[s\].
+    pub distribution: f64,
+    /// Checking a packing that was made in parallel for overlaps \[s\].
+    pub check: f64,
+    /// First migration, halo, neighbour and contact lists \[s\].
+    pub lists: f64,
+    /// The largest overlap of a packing that was made in parallel, if anything overlaps.
+    pub overlap: Option<Worst>,
+}
+
 /// The simulation of this rank, its particles with their owners.
 ///
 /// # Errors
-/// As [`model`] and [`Simulation::new`].
+/// As [`timed_simulation`].
 pub fn simulation(
+    comm: Communicator,
+    config: &Arc<Config>,
+    decomposition: Decomposition,
+    initial: Initial,
+    threads: usize,
+) -> Result<Simulation> {
+    timed_simulation(comm, config, decomposition, initial, threads).map(|(simulation, _)| simulation)
+}
+
+/// As [`simulation`], with what it took.
+///
+/// # Errors
+/// As [`model`] and [`Simulation::new`]; particles of a replicated packing overlap too far.
+pub fn timed_simulation(
     comm: Communicator,
     config: &Arc<Config>,
     decomposition: Decomposition,
     mut initial: Initial,
     threads: usize,
-) -> Result<Simulation> {
+) -> Result<(Simulation, SetupReport)> {
+    let mut report = SetupReport::default();
+    let started = Instant::now();
     let mut model = model(&comm, config, &initial)?;
     model.lists.skin = model.inner_skin();
     if initial.memory.keys.is_empty() {
@@ -251,8 +306,21 @@ pub fn simulation(
         particles_total: initial.global.particles,
         step: initial.global.step,
     };
-    let (particles, memory) = distribute(&comm, &setting, &initial.particles, &initial.memory)?;
-    Simulation::new(comm, model, decomposition, initial.global, particles, memory, threads)
+    let (mut particles, memory) = distribute(&comm, &setting, &initial.particles, &initial.memory)?;
+    // Not needed any more; the lists need the room.
+    initial.particles = Vec::new();
+    initial.memory = ContactMemory::new(0);
+    report.distribution = started.elapsed().as_secs_f64();
+    if config.replication != Replication::NONE && initial.global.step == 0 {
+        let started = Instant::now();
+        let space = overlap::Space { decomposition: &decomposition, sides: initial.global.sides, config };
+        report.overlap = overlap::largest(&comm, &space, &mut particles, model.max_radius)?;
+        report.check = started.elapsed().as_secs_f64();
+    }
+    let started = Instant::now();
+    let simulation = Simulation::new(comm, model, decomposition, initial.global, particles, memory, threads)?;
+    report.lists = started.elapsed().as_secs_f64();
+    Ok((simulation, report))
 }
 
 /// Give what ranks beyond the first `ranks` hold to the ranks that compute.

@@ -44,6 +44,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("run", &["error", "config", "state", "exchange", "force", "output", "plot", "setup", "simulation"]),
     ("verify", &["*"]),
     ("bench", &["*"]),
+    ("scaling", &["error", "exchange"]),
     ("cli", &["*"]),
 ];
 

@@ -75,7 +75,7 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     let gravity = root.axes("gravity");
     let (names, materials) = particles::read_materials(root);
     let cell = settings::read_cell(root, &names);
-    let packing = settings::read_packing(root, folder);
+    let packing = settings::read_packing(root, folder, cell.as_ref());
     let from_file = root.chooses("packing", "file");
     let species = particles::read_species(root, &names, from_file);
     let context = contact::Context {
@@ -90,7 +90,7 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     let time_step = settings::read_time_step(root);
     let output = settings::read_output(root, &stem);
     let parallel = settings::read_parallel(root);
-    let (cell, packing, species) = (cell?, packing?, species?);
+    let (cell, (packing, replication), species) = (cell?, packing?, species?);
     settings::check_cell(root, &cell, &packing, &species);
     let (pairs, max_overlap_fraction) = pairs?;
     let (kinematics, control_interval) = load?;
@@ -101,6 +101,7 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
         species,
         pairs,
         packing,
+        replication,
         gravity: gravity?,
         kinematics,
         stages: stages?,

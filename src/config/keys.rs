@@ -157,6 +157,20 @@ pub static PACKING: Table = Table {
     ],
 };
 
+const REPLICATE: Key = key(
+    "replicate",
+    Kind::Integers3,
+    Derived("[1, 1, 1]"),
+    "Copies of the packing per axis, side by side; counts, cell and file describe one of them. Each rank makes its \
+     own share of the copies, so that large packings come from small ones.",
+);
+const PERTURBATION: Key = key(
+    "perturbation",
+    number(Dimension::NONE, Range::closed(0.0, 0.5)),
+    ZERO,
+    "Every particle is moved at random by at most this fraction of its radius, so that copies differ.",
+);
+
 static RANDOM_CLOSE: Table = Table {
     meaning: "Jodrey-Tory random close packing of spheres in a periodic cell; ends with spheres just touching.",
     keys: &[
@@ -172,18 +186,24 @@ static RANDOM_CLOSE: Table = Table {
             Default::Number(1e5),
             "Give up after this many moves per particle.",
         ),
+        REPLICATE,
+        PERTURBATION,
     ],
 };
 
 static FILE: Table = Table {
     meaning: "Particles from a file; the cell's `sides` must be given.",
-    keys: &[key(
-        "path",
-        Kind::Text,
-        Required,
-        "CSV or HDF5 file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
-         optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s.",
-    )],
+    keys: &[
+        key(
+            "path",
+            Kind::Text,
+            Required,
+            "CSV or HDF5 file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
+             optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s.",
+        ),
+        REPLICATE,
+        PERTURBATION,
+    ],
 };
 
 /// `[load]`.

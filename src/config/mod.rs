@@ -40,6 +40,8 @@ pub struct Config {
     pub pairs: Vec<PairConfig>,
     /// How the initial positions are made.
     pub packing: PackingConfig,
+    /// What becomes of that packing before the run starts.
+    pub replication: Replication,
     /// Uniform body acceleration \[m/s²\].
     pub gravity: [f64; 3],
     /// BCT or BC (PHYSICS.md section 5).
@@ -234,6 +236,32 @@ pub enum PackingConfig {
         /// Path as resolved against the configuration's folder.
         path: PathBuf,
     },
+}
+
+/// Copies of the packing side by side, and the random displacement of every particle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Replication {
+    /// Copies per axis, at least 1; 1 along walled axes.
+    pub copies: [usize; 3],
+    /// Largest displacement over radius.
+    pub perturbation: f64,
+}
+
+impl Replication {
+    /// The packing as it is.
+    pub const NONE: Self = Self { copies: [1; 3], perturbation: 0.0 };
+
+    /// Number of copies; saturates.
+    #[must_use]
+    pub fn number(&self) -> u64 {
+        self.copies.iter().fold(1, |product, &copies| product.saturating_mul(copies as u64))
+    }
+
+    /// Sides of the whole cell from those of one copy \[m\].
+    #[must_use]
+    pub fn whole(&self, sides: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k| sides[k] * self.copies[k] as f64)
+    }
 }
 
 /// Load type (W Sec. 2.3).

@@ -2,7 +2,9 @@
 
 use super::alternatives::Chosen;
 use super::section::Section;
-use super::{Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, SimdConfig, Species, TimeStepConfig};
+use super::{
+    Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, Replication, SimdConfig, Species, TimeStepConfig,
+};
 use std::path::{Path, PathBuf};
 
 /// Read `[cell]`.
@@ -43,9 +45,14 @@ pub(super) fn read_cell(root: &Section, materials: &[String]) -> Option<CellConf
 }
 
 /// Read `[packing]`; paths are relative to `folder`.
-pub(super) fn read_packing(root: &Section, folder: &Path) -> Option<PackingConfig> {
+pub(super) fn read_packing(
+    root: &Section,
+    folder: &Path,
+    cell: Option<&CellConfig>,
+) -> Option<(PackingConfig, Replication)> {
     match root.choose("packing")? {
         Chosen::Table("file", section) => {
+            let replication = read_replication(&section, cell);
             let path = folder.join(section.text("path")?);
             if !path.is_file() {
                 let message = format!("there is no file {}", path.display());
@@ -55,18 +62,35 @@ pub(super) fn read_packing(root: &Section, folder: &Path) -> Option<PackingConfi
             // Absolute, so that the resolved text runs from wherever it is kept.
             let path = std::path::absolute(&path).unwrap_or(path);
             section.record_text("path", &path.to_string_lossy());
-            Some(PackingConfig::File { path })
+            Some((PackingConfig::File { path }, replication?))
         }
         Chosen::Table(_, section) => {
             let contraction_rate = section.number("contraction_rate");
             let max_moves_per_particle = section.number("max_moves_per_particle");
-            Some(PackingConfig::RandomClose {
+            let replication = read_replication(&section, cell);
+            let packing = PackingConfig::RandomClose {
                 contraction_rate: contraction_rate?,
                 max_moves_per_particle: max_moves_per_particle?,
-            })
+            };
+            Some((packing, replication?))
         }
         Chosen::Value(_) => None,
     }
+}
+
+/// Read what both kinds of packings share.
+fn read_replication(section: &Section, cell: Option<&CellConfig>) -> Option<Replication> {
+    let copies = if section.given("replicate") { section.integers3("replicate") } else { Some([1; 3]) };
+    let perturbation = section.number("perturbation");
+    let copies = copies?;
+    for axis in (0..3).filter(|&axis| copies[axis] > 1) {
+        if cell.is_some_and(|cell| cell.boundary[axis] != Boundary::Periodic) {
+            let message = format!("{} copies along the {} axis, which has walls", copies[axis], ["x", "y", "z"][axis]);
+            section.problem("replicate", message, "give 1 for this axis, or make its boundary periodic");
+            return None;
+        }
+    }
+    Some(Replication { copies, perturbation: perturbation? })
 }
 
 /// Spheres that fill more than this cannot be packed (the densest packing of equal spheres).

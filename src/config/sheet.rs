@@ -63,11 +63,15 @@ struct Estimate {
 
 impl Estimate {
     fn new(config: &Config) -> Self {
-        let count: f64 = config.species.iter().map(|s| s.count as f64).sum();
-        let solid_volume: f64 = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
+        let copies = config.replication.number() as f64;
+        let count: f64 = copies * config.species.iter().map(|s| s.count as f64).sum::<f64>();
+        let volumes = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume());
+        let solid_volume: f64 = copies * volumes.sum::<f64>();
         let solid_fraction = match (config.cell.sides, &config.packing) {
             (Some(_), PackingConfig::File { .. }) => None,
-            (Some(sides), PackingConfig::RandomClose { .. }) => Some(solid_volume / (sides[0] * sides[1] * sides[2])),
+            (Some(sides), PackingConfig::RandomClose { .. }) => {
+                Some(solid_volume / (copies * sides[0] * sides[1] * sides[2]))
+            }
             (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
         let mut progress = Progress::default();
@@ -92,6 +96,10 @@ impl Estimate {
         let fraction = solid_fraction.unwrap_or(RANDOM_CLOSE);
         // Radius over radius: strain ε brings centres 2R apart closer by 2εR.
         let mut overlap = (2.0 * strain, "strain");
+        // Two touching spheres that both move towards each other.
+        if 2.0 * config.replication.perturbation > overlap.0 {
+            overlap = (2.0 * config.replication.perturbation, "perturbation");
+        }
         for meeting in Meeting::all(config) {
             let under_stress =
                 meeting.overlap_under(force_of_pressure(stress, fraction, meeting.radius)) / meeting.radius;
@@ -211,16 +219,17 @@ fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, St
 
 fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
     if let PackingConfig::File { path } = &config.packing {
-        table.row("particles", format!("from {}", path.display()));
+        table.row("particles", format!("from {}{}", path.display(), copies_of(config, "")));
     } else {
-        table.row("particles", format!("{}", estimate.count));
+        let base = format!(" of {}", config.species.iter().map(|s| s.count).sum::<usize>());
+        table.row("particles", format!("{}{}", estimate.count, copies_of(config, &base)));
         let mass = |scaled: bool| -> f64 {
             let of = |s: &Species| {
                 let material = &config.materials[s.material];
                 let density = material.density * if scaled { material.density_scaling } else { 1.0 };
                 s.count as f64 * s.radius.mean_volume() * density
             };
-            config.species.iter().map(of).sum()
+            config.replication.number() as f64 * config.species.iter().map(of).sum::<f64>()
         };
         table.row("mass", format!("{} (in motion: {})", quantity(mass(false), "kg"), quantity(mass(true), "kg")));
         table.row(
@@ -239,18 +248,26 @@ fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
         };
         table.row(format!("radius of {}", species.name), text);
     }
-    let sides = config.cell.sides.or_else(|| {
-        let volume = estimate.solid_volume / estimate.solid_fraction?;
+    let base_sides = config.cell.sides.or_else(|| {
+        let volume = estimate.solid_volume / config.replication.number() as f64 / estimate.solid_fraction?;
         let [a, b, c] = config.cell.aspect;
         let unit = libm::cbrt(volume / (a * b * c));
         Some([a * unit, b * unit, c * unit])
     });
-    if let Some(sides) = sides {
+    if let Some(sides) = base_sides.map(|sides| config.replication.whole(sides)) {
         let text = sides.map(|side| quantity(side, "m")).join(" × ");
         table.row("cell", if config.cell.sides.is_some() { text } else { format!("about {text}") });
     }
     if let Some(fraction) = estimate.solid_fraction {
         table.row("solid fraction", format!("{fraction:.3}"));
+    }
+}
+
+/// `, 8 copies of 1000`, or nothing.
+fn copies_of(config: &Config, base: &str) -> String {
+    match config.replication.number() {
+        1 => String::new(),
+        copies => format!(" ({copies} copies{base})"),
     }
 }
 

@@ -100,6 +100,24 @@ impl Decomposition {
         (coordinates[0] * self.grid[1] + coordinates[1]) * self.grid[2] + coordinates[2]
     }
 
+    /// The other ranks whose boxes share a face, an edge or a corner with that of `rank`, those across the
+    /// faces of the cell included, ascending.
+    #[must_use]
+    pub fn neighbours(&self, rank: usize) -> Vec<usize> {
+        let own = self.coordinates(rank);
+        let columns = [0, 1, 2].map(|k| [self.grid[k] - 1, 0, 1].map(|step| (own[k] + step) % self.grid[k]));
+        let mut ranks = Vec::with_capacity(27);
+        for x in columns[0] {
+            for y in columns[1] {
+                ranks.extend(columns[2].map(|z| self.rank([x, y, z])));
+            }
+        }
+        ranks.sort_unstable();
+        ranks.dedup();
+        ranks.retain(|&other| other != rank);
+        ranks
+    }
+
     /// Grid coordinates of a rank.
     #[must_use]
     pub fn coordinates(&self, rank: usize) -> [usize; 3] {
@@ -137,6 +155,18 @@ mod tests {
         assert!(Decomposition::explicit([2, 0, 2], 3).is_err());
         assert!(Decomposition::explicit([usize::MAX, 2, 1], 3).is_err());
         assert_eq!(Decomposition::explicit([3, 1, 1], 5).map(|d| d.ranks()).ok(), Some(3));
+    }
+
+    #[test]
+    fn neighbours_touch_across_the_faces_of_the_cell_and_are_mutual() {
+        assert_eq!(Decomposition { grid: [4, 1, 1] }.neighbours(0), [1, 3]);
+        assert_eq!(Decomposition { grid: [2, 1, 1] }.neighbours(1), [0]);
+        assert!(Decomposition { grid: [1; 3] }.neighbours(0).is_empty());
+        let grid = Decomposition { grid: [5, 4, 3] };
+        for rank in 0..grid.ranks() {
+            assert_eq!(grid.neighbours(rank).len(), 26);
+            assert!(grid.neighbours(rank).iter().all(|&other| grid.neighbours(other).contains(&rank)));
+        }
     }
 
     proptest! {

@@ -22,6 +22,12 @@ impl HaloContent {
     fn words(self) -> usize {
         if self.velocities { 11 } else { 5 }
     }
+
+    /// Bytes per particle.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        self.words() * size_of::<u64>()
+    }
 }
 
 /// What a ghost is when it appears.

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::state::particles::{Extras, Particles, SpeciesConstants};
 use crate::state::{ContactKey, ContactMemory, ParticleState};
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 
 /// What migration reads beside particles and memory; the same on all ranks.
 #[derive(Debug, Clone, Copy)]
@@ -69,24 +70,55 @@ pub fn migrate(
         return Ok(0);
     }
     let before = census(particles);
-    let mut parcels = vec![Parcel::default(); comm.size()];
+    let mut parcels = BTreeMap::<usize, Parcel>::new();
     let leaving: FxHashMap<u32, usize> = (0..particles.owned)
         .filter(|&index| owners[index] != rank)
         .map(|index| (particles.id[index], owners[index]))
         .collect();
     for index in (0..particles.owned).filter(|&index| owners[index] != rank) {
-        parcels[owners[index]].states.push(particles.state(index));
+        parcels.entry(owners[index]).or_default().states.push(particles.state(index));
     }
     if !leaving.is_empty() {
         keep_owned(particles, |index| owners[index] == rank);
         hand_over_rows(&mut parcels, &leaving, &particles.id, memory);
     }
-    let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
+    let parcels = parcels.into_iter().map(|(to, parcel)| (to, parcel.to_bytes())).collect();
+    let received = deliver(comm, &setting.decomposition.neighbours(rank), parcels);
     let arriving = Parcel::from_bytes(&received, memory.width);
     append(particles, Particles::from_states(&arriving.states, setting.species, setting.extras));
     agree(comm, merge_rows(memory, &arriving.rows, setting.step))?;
     let after = census(particles);
     conserved(comm, setting, [before[0], after[0], before[1], after[1], leaving.len() as i64])
+}
+
+/// Send each parcel to its rank; returned is what came, in order of the senders. Between two rebuilds
+/// particles cross into neighbouring boxes, and then nothing here grows with the number of all ranks;
+/// if any rank has a parcel for a farther one, all ranks exchange with all. Collective.
+fn deliver(comm: &Communicator, neighbours: &[usize], parcels: BTreeMap<usize, Vec<u8>>) -> Vec<Vec<u8>> {
+    let mut far = [i64::from(parcels.keys().any(|to| neighbours.binary_search(to).is_err()))];
+    comm.max_i64(&mut far);
+    if far[0] != 0 {
+        let mut sends = vec![Vec::new(); comm.size()];
+        for (to, parcel) in parcels {
+            sends[to] = parcel;
+        }
+        return comm.all_to_all(sends);
+    }
+    let length = |to: &usize| parcels.get(to).map_or(0, |parcel| parcel.len() as u64);
+    let lengths: Vec<u64> = neighbours.iter().map(length).collect();
+    let mut coming = vec![0_u64; neighbours.len()];
+    comm.exchange_each(
+        neighbours.iter().zip(&lengths).map(|(&to, length)| (to, bytemuck::bytes_of(length))),
+        neighbours.iter().zip(&mut coming).map(|(&from, length)| (from, bytemuck::bytes_of_mut(length))),
+        || (),
+    );
+    let mut received: Vec<Vec<u8>> = coming.iter().map(|&length| vec![0; length as usize]).collect();
+    comm.exchange_each(
+        parcels.iter().map(|(&to, parcel)| (to, parcel.as_slice())),
+        neighbours.iter().zip(&mut received).map(|(&from, place)| (from, place.as_mut_slice())),
+        || (),
+    );
+    received
 }
 
 /// Keep the owned particles at these indices, in their order. There are no ghosts.
@@ -146,7 +178,7 @@ fn conserved(comm: &Communicator, setting: &MigrationSetting, mut counts: [i64; 
 
 /// Copy rows to where their ends go, then keep those that still have an end in `staying`.
 fn hand_over_rows(
-    parcels: &mut [Parcel],
+    parcels: &mut BTreeMap<usize, Parcel>,
     leaving: &FxHashMap<u32, usize>,
     staying: &[u32],
     memory: &mut ContactMemory,
@@ -157,10 +189,10 @@ fn hand_over_rows(
         let row = memory.row(index);
         let (low, high) = (leaving.get(&key.low), leaving.get(&key.high));
         if let Some(&to) = low {
-            push_row(&mut parcels[to].rows, key, row);
+            push_row(&mut parcels.entry(to).or_default().rows, key, row);
         }
         if let Some(&to) = high.filter(|&to| low != Some(to)) {
-            push_row(&mut parcels[to].rows, key, row);
+            push_row(&mut parcels.entry(to).or_default().rows, key, row);
         }
         // Walls are never in `staying`: a wall's row goes with its particle.
         if staying.contains(&key.low) || staying.contains(&key.high) {
@@ -254,8 +286,10 @@ pub fn distribute(
             push_row(&mut parcels[to as usize].rows, key, memory.row(index));
         }
     }
-    let received = comm.all_to_all(parcels.iter().map(Parcel::to_bytes).collect());
+    // Each copy of the particles goes as soon as the next one stands.
+    let received = comm.all_to_all(parcels.into_iter().map(|parcel| parcel.to_bytes()).collect());
     let arriving = Parcel::from_bytes(&received, memory.width);
+    drop(received);
     let particles = Particles::from_states(&arriving.states, setting.species, setting.extras);
     let mut owned_memory = ContactMemory::new(memory.width);
     agree(comm, merge_rows(&mut owned_memory, &arriving.rows, setting.step))?;

@@ -9,6 +9,7 @@ pub mod exact_sum;
 pub mod halo;
 mod halo_map;
 pub mod migrate;
+pub mod model;
 #[cfg(feature = "mpi")]
 mod mpi_backend;
 pub mod redistribute;

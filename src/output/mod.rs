@@ -8,4 +8,5 @@ pub mod hdf5_file;
 pub mod history;
 pub mod log;
 pub mod plot;
+pub mod ranks;
 pub mod snapshot;

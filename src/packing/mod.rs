@@ -7,6 +7,7 @@ pub mod overlap;
 pub mod radii;
 pub mod random;
 pub mod rcp;
+pub mod replicate;
 pub mod tournament;
 
 #[cfg(test)]
@@ -18,7 +19,7 @@ use crate::state::{LEDGER, ParticleState};
 use grid::{Ball, Cell};
 use random::{Draws, Purpose};
 
-pub use overlap::check_overlaps;
+pub use overlap::{Worst, check_overlaps};
 
 /// The cell and all its particles at time 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,9 +62,9 @@ pub fn build(config: &Config) -> Result<Packing> {
 }
 
 /// Ids are 32 bits wide and walls are numbered after the particles.
-const MAX_PARTICLES: usize = u32::MAX as usize - 16;
+pub(crate) const MAX_PARTICLES: usize = u32::MAX as usize - 16;
 
-fn periodic_axes(cell: &CellConfig) -> [bool; 3] {
+pub(crate) fn periodic_axes(cell: &CellConfig) -> [bool; 3] {
     cell.boundary.map(|boundary| boundary == Boundary::Periodic)
 }
 

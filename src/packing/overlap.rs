@@ -3,12 +3,31 @@
 use super::grid::{Ball, Cell, Grid};
 use crate::error::{Error, Result};
 
-/// A pair of particles (or a particle and a wall) and how far they overlap.
+/// A pair of particles and how far they overlap.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Worst {
-    ids: [usize; 2],
+pub struct Worst {
+    /// The two ids, low first.
+    pub ids: [u32; 2],
     /// Overlap over the smaller radius.
-    fraction: f64,
+    pub fraction: f64,
+}
+
+impl Worst {
+    /// That the pair is allowed to overlap so far.
+    ///
+    /// # Errors
+    /// [`Error::Packing`] naming the pair, its overlap and what to do.
+    pub fn check(&self, max_fraction: f64) -> Result<()> {
+        if self.fraction <= max_fraction {
+            return Ok(());
+        }
+        let ([low, high], fraction) = (self.ids, self.fraction);
+        Err(Error::Packing(format!(
+            "particles {low} and {high} overlap by {fraction:.4} of the smaller radius, where {max_fraction} is allowed; \
+             correct their positions or radii, enlarge the cell, lower packing.perturbation, or raise the allowed \
+             overlap fraction"
+        )))
+    }
 }
 
 /// Refuse balls (index = id) of which a pair, images of one particle included, overlaps by more than
@@ -19,40 +38,48 @@ struct Worst {
 /// # Errors
 /// [`Error::Packing`] naming the worst pair, its overlap and what to do.
 pub fn check_overlaps(balls: &[Ball], cell: &Cell, max_fraction: f64) -> Result<()> {
-    check_against_faces(balls, cell, max_fraction)?;
+    check_against_faces((0..).zip(balls.iter().copied()), cell, max_fraction)?;
+    let ids: Vec<u32> = (0..balls.len() as u32).collect();
+    worst_overlap(balls, &ids, balls.len(), cell, max_fraction).map_or(Ok(()), |worst| worst.check(max_fraction))
+}
+
+/// The pair of which the first ball is among the first `own` of `balls` that overlaps most, if it does by
+/// more than `floor` of the smaller radius; of equal ones that of the lowest ids. `ids` of the balls;
+/// balls of one id are images of each other and are no pair. Every side of the cell is at least a
+/// diameter along its periodic axes.
+#[must_use]
+pub fn worst_overlap(balls: &[Ball], ids: &[u32], own: usize, cell: &Cell, floor: f64) -> Option<Worst> {
+    if balls.is_empty() {
+        return None;
+    }
     let grid = Grid::new(*cell, balls, 1.0);
-    let mut worst = Worst { ids: [0, 0], fraction: max_fraction };
-    for (index, ball) in balls.iter().enumerate() {
-        grid.visit_near(index, ball, 1.0, true, |other, image| {
-            if other == index {
+    let mut worst = Worst { ids: [0, 0], fraction: floor };
+    for (index, ball) in balls[..own].iter().enumerate() {
+        // Each pair of own balls once, from its smaller one.
+        grid.visit_near(index, ball, 1.0, own == balls.len(), |other, image| {
+            if ids[other] == ids[index] {
                 return;
             }
             let partner = &balls[other];
             let d = image.separation(ball, partner);
             let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
             let fraction = (ball.radius + partner.radius - distance) / ball.radius.min(partner.radius);
-            let ids = [index.min(other), index.max(other)];
-            if fraction > worst.fraction || (fraction == worst.fraction && fraction > max_fraction && ids < worst.ids) {
-                worst = Worst { ids, fraction };
+            let pair = [ids[index].min(ids[other]), ids[index].max(ids[other])];
+            if fraction > worst.fraction || (fraction == worst.fraction && fraction > floor && pair < worst.ids) {
+                worst = Worst { ids: pair, fraction };
             }
         });
     }
-    if worst.fraction > max_fraction {
-        let [low, high] = worst.ids;
-        return Err(Error::Packing(format!(
-            "particles {low} and {high} overlap by {:.4e} m, {:.4} of the smaller radius, where {max_fraction} is \
-             allowed; correct their positions or radii, enlarge the cell, or raise the allowed overlap fraction",
-            worst.fraction * balls[low].radius.min(balls[high].radius),
-            worst.fraction
-        )));
-    }
-    Ok(())
+    (worst.fraction > floor).then_some(worst)
 }
 
 /// Own images across the periodic faces, and walls. It comes first: thereafter the cell is known to be
 /// wide enough for a search of few images.
-fn check_against_faces(balls: &[Ball], cell: &Cell, max_fraction: f64) -> Result<()> {
-    for (id, ball) in balls.iter().enumerate() {
+///
+/// # Errors
+/// [`Error::Packing`] naming the particle, its overlap and what to do.
+pub fn check_against_faces(balls: impl Iterator<Item = (u32, Ball)>, cell: &Cell, max_fraction: f64) -> Result<()> {
+    for (id, ball) in balls {
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             let (side, position) = (cell.sides[axis], ball.position[axis]);
             let (overlap, what) = if cell.periodic[axis] {

@@ -14,6 +14,8 @@ pub enum Purpose {
     Position = 2,
     /// Initial velocities.
     Velocity = 3,
+    /// Displacements of a replicated packing.
+    Perturbation = 4,
 }
 
 /// The sequence of random numbers of one particle for one purpose.

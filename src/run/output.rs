@@ -1,5 +1,6 @@
 //! What a run writes while it goes: history, snapshots, the terminal, the tables at its end.
 
+use super::efforts::{Efforts, resident_bytes};
 use crate::config::{AxisControl, Config, Interval};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
@@ -9,6 +10,7 @@ use crate::output::digest::Digest;
 use crate::output::history::HistoryWriter;
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
 use crate::output::plot;
+use crate::output::ranks::{effort_table, rank_table};
 use crate::output::snapshot::{Moment, SnapshotSeries};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
@@ -86,6 +88,7 @@ pub struct RunOutput {
     history: Option<HistoryWriter>,
     snapshots: Option<SnapshotSeries>,
     log: Option<Log>,
+    efforts: Efforts,
 }
 
 impl RunOutput {
@@ -93,7 +96,7 @@ impl RunOutput {
     ///
     /// # Errors
     /// Files cannot be made, or hold less than the checkpoint counts.
-    pub fn new(simulation: &Simulation, config: &Arc<Config>) -> Result<Self> {
+    pub fn new(simulation: &Simulation, config: &Arc<Config>, efforts: Efforts) -> Result<Self> {
         let (comm, global) = (simulation.comm(), simulation.global());
         let directory = &config.output.directory;
         let first = comm.rank() == 0;
@@ -107,7 +110,7 @@ impl RunOutput {
             Some(_) => Some(SnapshotSeries::resume(comm, directory, global.snapshots)?),
             None => None,
         };
-        Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new) })
+        Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new), efforts })
     }
 
     /// Write what was wanted of a report. Collective.
@@ -135,11 +138,18 @@ impl RunOutput {
             let moment = Moment { step: global.step, time: global.time, sides: global.sides };
             let total = global.particles;
             let contacts = self.config.output.snapshot_contacts.then(|| simulation.snapshot_contacts(&report.samples));
-            series.write(&moment, total, simulation.snapshot_particles(&report.samples), contacts)?;
+            let started = Instant::now();
+            let path = series.write(&moment, total, simulation.snapshot_particles(&report.samples), contacts)?;
+            self.efforts.snapshot(&path, started.elapsed().as_secs_f64());
             simulation.global_mut().snapshots += 1;
         }
         simulation.timers_mut().stop();
         Ok(())
+    }
+
+    /// A checkpoint was written.
+    pub fn count_checkpoint(&mut self, path: &Path, seconds: f64) {
+        self.efforts.checkpoint(path, seconds);
     }
 
     /// Move the progress bar now and then.
@@ -193,10 +203,11 @@ impl RunOutput {
             bytes: resident_bytes(),
         };
         let table = cost_table(simulation.comm(), &stage_times(simulation.timers(), wall), &size);
+        let ranks = rank_table(simulation.comm(), &self.efforts.per_rank(simulation));
         let mut written = Ok(());
         if simulation.comm().rank() == 0 {
             let started = Instant::now();
-            println!("\n{table}");
+            println!("\n{table}\n{ranks}\n{}", effort_table(&self.efforts.rows()));
             println!("digest {digest}");
             written = self.status("finished", &format!("digest = \"{digest}\"\n"));
             if self.config.output.plots && written.is_ok() {
@@ -232,16 +243,6 @@ fn progress(config: &Config, global: &GlobalState) -> f64 {
 fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {
     let [neighbours, contacts, step, observe, halo, reduce, output] = timers.seconds();
     StageTimes { neighbours, contacts, step, observe, halo, reduce, output, total: wall.as_secs_f64() }
-}
-
-/// Resident memory of this process \[B\]; 0 where the system does not say.
-#[must_use]
-pub fn resident_bytes() -> u64 {
-    let pages = fs::read_to_string("/proc/self/statm")
-        .ok()
-        .and_then(|text| text.split_whitespace().nth(1)?.parse::<u64>().ok())
-        .unwrap_or(0);
-    pages * 4096
 }
 
 /// Row number `written` is due at `written` intervals.

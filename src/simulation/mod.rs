@@ -7,6 +7,7 @@ mod report;
 mod snapshot;
 mod strips;
 mod timers;
+mod traffic;
 
 pub use report::Report;
 pub use timers::{STAGES, Stage, Timers};
