@@ -320,6 +320,7 @@ pub enum TimeStepConfig {
 
 /// What is written.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "one switch each")]
 pub struct OutputConfig {
     /// The run directory.
     pub directory: PathBuf,

@@ -294,7 +294,7 @@ impl StripView<'_> {
 struct Rows<'a> {
     memory: &'a ContactMemory,
     offsets: Vec<u32>,
-    rows: Vec<u32>,
+    order: Vec<u32>,
 }
 
 impl<'a> Rows<'a> {
@@ -314,12 +314,12 @@ impl<'a> Rows<'a> {
             rows[*slot as usize] = row as u32;
             *slot += 1;
         }
-        Self { memory, offsets, rows }
+        Self { memory, offsets, order: rows }
     }
 
     fn find(&self, first: usize, key: &ContactKey) -> Option<&'a [f64]> {
         let range = self.offsets[first] as usize..self.offsets[first + 1] as usize;
-        let row = self.rows[range].iter().find(|row| self.memory.keys[**row as usize] == *key)?;
+        let row = self.order[range].iter().find(|row| self.memory.keys[**row as usize] == *key)?;
         Some(self.memory.row(*row as usize))
     }
 }

@@ -357,7 +357,7 @@ mod tests {
         assert!(!plan.is_border(0));
         let mut wrapped = vec![(1, [0; 3])];
         let content = HaloContent { velocities: true };
-        assert_eq!(plan.update(&comm, &mut particles, content, &mut wrapped, Particles::len), 1);
+        assert_eq!(plan.update(&comm, &mut particles, content, &mut wrapped, |p| p.len()), 1);
         assert!(wrapped.is_empty());
     }
 }

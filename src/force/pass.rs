@@ -4,6 +4,8 @@
 use super::composition::{self, MAX_MEMORY};
 use super::geometry::{self, Bodies, CellMotion, PairTouch};
 use super::lane::{Lane, cross, dot, scale, sub};
+#[cfg(target_arch = "x86_64")]
+use super::lane::{avx2::F64x4, avx512::F64x8};
 use super::law::{Column, ContactLaw, LawVisitor, Touch};
 use super::observe::Observed;
 use super::simd::Simd;
@@ -47,6 +49,21 @@ pub struct LineRing<'a> {
     pub mask: usize,
 }
 
+/// Some blocks of a section to evaluate.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// What all passes share.
+    pub input: &'a PassInput<'a>,
+    /// Records of owned particles and ghosts from the section's origin on.
+    pub records: &'a [Record],
+    /// The section; its memory moves on by one step.
+    pub section: &'a mut Section,
+    /// Numbers of the blocks.
+    pub blocks: Range<usize>,
+    /// Where the forces go.
+    pub lines: LineRing<'a>,
+}
+
 /// A contact that overlaps too much or is not a number: its place in the section and overlap ratio.
 pub type Excess = Option<(usize, f64)>;
 
@@ -60,16 +77,8 @@ pub trait PairPass: Send + Sync {
     fn stride(&self) -> usize;
     /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
     fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
-    /// Evaluate some blocks of a section: forces to `lines`, memory moved on by one step. `records` start at the
-    /// section's origin.
-    fn run(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess;
+    /// Evaluate some blocks of a section.
+    fn run(&self, job: Job) -> Excess;
     /// Look at some blocks of a section without changing anything.
     fn observe(
         &self,
@@ -132,33 +141,25 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
     }
 
-    fn run(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess {
-        if section.partners == Partners::Wall {
-            return self.walls(input, records, section, blocks, lines);
+    fn run(&self, job: Job) -> Excess {
+        if job.section.partners == Partners::Wall {
+            return self.walls(job);
         }
-        match (input.simd, input.ledger) {
-            (Simd::Scalar, false) => self.spheres::<f64, false>(input, records, section, blocks, lines),
-            (Simd::Scalar, true) => self.spheres::<f64, true>(input, records, section, blocks, lines),
+        match (job.input.simd, job.input.ledger) {
             // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
             #[cfg(target_arch = "x86_64")]
-            (Simd::Avx2, false) => unsafe { self.spheres_avx2::<false>(input, records, section, blocks, lines) },
+            (Simd::Avx512, false) => unsafe { self.spheres_avx512::<false>(job) },
+            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            (Simd::Avx2, true) => unsafe { self.spheres_avx2::<true>(input, records, section, blocks, lines) },
+            (Simd::Avx512, true) => unsafe { self.spheres_avx512::<true>(job) },
+            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            (Simd::Avx512, false) => unsafe { self.spheres_avx512::<false>(input, records, section, blocks, lines) },
+            (Simd::Avx2, false) => unsafe { self.spheres_avx2::<false>(job) },
+            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            (Simd::Avx512, true) => unsafe { self.spheres_avx512::<true>(input, records, section, blocks, lines) },
-            #[cfg(not(target_arch = "x86_64"))]
-            (_, false) => self.spheres::<f64, false>(input, records, section, blocks, lines),
-            #[cfg(not(target_arch = "x86_64"))]
-            (_, true) => self.spheres::<f64, true>(input, records, section, blocks, lines),
+            (Simd::Avx2, true) => unsafe { self.spheres_avx2::<true>(job) },
+            (_, false) => self.spheres::<f64, false>(job),
+            (_, true) => self.spheres::<f64, true>(job),
         }
     }
 
@@ -175,6 +176,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
                 // SAFETY: as in `run`.
                 #[cfg(target_arch = "x86_64")]
                 Simd::Avx2 => unsafe { self.peaks_avx2(input, records, section, blocks) },
+                // SAFETY: as in `run`.
                 #[cfg(target_arch = "x86_64")]
                 Simd::Avx512 => unsafe { self.peaks_avx512(input, records, section, blocks) },
                 _ => self.peaks::<f64>(input, records, section, blocks),
@@ -193,39 +195,19 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 impl<C: ContactLaw> LawPass<C> {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn spheres_avx2<const LEDGER: bool>(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess {
-        self.spheres::<super::lane::avx2::F64x4, LEDGER>(input, records, section, blocks, lines)
+    fn spheres_avx2<const LEDGER: bool>(&self, job: Job) -> Excess {
+        self.spheres::<F64x4, LEDGER>(job)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl")]
-    fn spheres_avx512<const LEDGER: bool>(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess {
-        self.spheres::<super::lane::avx512::F64x8, LEDGER>(input, records, section, blocks, lines)
+    fn spheres_avx512<const LEDGER: bool>(&self, job: Job) -> Excess {
+        self.spheres::<F64x8, LEDGER>(job)
     }
 
     #[inline(always)]
-    fn spheres<L: Lane, const LEDGER: bool>(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess {
+    fn spheres<L: Lane, const LEDGER: bool>(&self, job: Job) -> Excess {
+        let Job { input, records, section, blocks, lines } = job;
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
         let last = section.first.len();
@@ -254,14 +236,8 @@ impl<C: ContactLaw> LawPass<C> {
         excess
     }
 
-    fn walls(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &mut Section,
-        blocks: Range<usize>,
-        lines: LineRing,
-    ) -> Excess {
+    fn walls(&self, job: Job) -> Excess {
+        let Job { input, records, section, blocks, lines } = job;
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
@@ -333,13 +309,13 @@ impl<C: ContactLaw> LawPass<C> {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn peaks_avx2(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
-        self.peaks::<super::lane::avx2::F64x4>(input, records, section, blocks)
+        self.peaks::<F64x4>(input, records, section, blocks)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl")]
     fn peaks_avx512(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
-        self.peaks::<super::lane::avx512::F64x8>(input, records, section, blocks)
+        self.peaks::<F64x8>(input, records, section, blocks)
     }
 
     /// Largest tangent stiffness and largest overlap over the smaller radius.
@@ -407,6 +383,9 @@ fn first_excess<L: Lane>(pair: &PairTouch<L>, limit: f64, place: usize) -> Exces
     let (mut overlap, mut radius) = ([0.0; BLOCK], [0.0; BLOCK]);
     pair.touch.overlap.store(&mut overlap);
     pair.min_radius.store(&mut radius);
-    let beyond = |lane: &usize| L::lane(pair.touching, *lane) && !(overlap[*lane] <= limit * radius[*lane]);
+    let beyond = |lane: &usize| {
+        let within = overlap[*lane] <= limit * radius[*lane];
+        L::lane(pair.touching, *lane) && !within
+    };
     (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlap[lane] / radius[lane]))
 }

@@ -163,67 +163,51 @@ fn cross(crossed: &mut [i8; 4], wraps: [i32; 3]) {
     }
 }
 
-/// Sum the forces on some particles of a slice and move them one step. `ends` and `offsets` are those of the
-/// contact list.
-pub fn advance(
-    slice: &mut Slice,
-    range: Range<usize>,
-    offsets: &[u32],
-    ends: &[End],
-    lines: &Lines,
-    motion: &StepMotion,
-    result: &mut StepResult,
-) {
-    match motion.simd {
+/// Particles of a slice to move, and what moves them.
+#[derive(Debug)]
+pub struct Batch<'a> {
+    /// Places in the slice.
+    pub range: Range<usize>,
+    /// Offsets of the contact list.
+    pub offsets: &'a [u32],
+    /// Ends of the contact list.
+    pub ends: &'a [End],
+    /// Output lines.
+    pub lines: Lines<'a>,
+    /// What is the same for all.
+    pub motion: &'a StepMotion,
+}
+
+/// Sum the forces on some particles of a slice and move them one step.
+pub fn advance(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    match batch.motion.simd {
         // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2 => unsafe { advance_avx2(slice, range, offsets, ends, lines, motion, result) },
+        Simd::Avx512 => unsafe { advance_avx512(slice, batch, result) },
+        // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512 => unsafe { advance_avx512(slice, range, offsets, ends, lines, motion, result) },
-        _ => advance_range::<Portable<4>>(slice, range, offsets, ends, lines, motion, result),
+        Simd::Avx2 => unsafe { advance_avx2(slice, batch, result) },
+        _ => advance_range::<Portable<4>>(slice, batch, result),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn advance_avx2(
-    slice: &mut Slice,
-    range: Range<usize>,
-    offsets: &[u32],
-    ends: &[End],
-    lines: &Lines,
-    motion: &StepMotion,
-    result: &mut StepResult,
-) {
-    advance_range::<F64x4>(slice, range, offsets, ends, lines, motion, result);
+fn advance_avx2(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    advance_range::<F64x4>(slice, batch, result);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl")]
-fn advance_avx512(
-    slice: &mut Slice,
-    range: Range<usize>,
-    offsets: &[u32],
-    ends: &[End],
-    lines: &Lines,
-    motion: &StepMotion,
-    result: &mut StepResult,
-) {
-    advance_range::<F64x4>(slice, range, offsets, ends, lines, motion, result);
+fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    advance_range::<F64x4>(slice, batch, result);
 }
 
 /// The motion, a particle at a time in lanes (x, y, z, not used). The position shares its lanes with the
 /// radius, which the constants of the fourth lane leave as it is.
 #[inline(always)]
-fn advance_range<L: Lane>(
-    slice: &mut Slice,
-    range: Range<usize>,
-    offsets: &[u32],
-    ends: &[End],
-    lines: &Lines,
-    motion: &StepMotion,
-    result: &mut StepResult,
-) {
+fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    let Batch { range, offsets, ends, lines, motion } = batch;
     const { assert!(L::WIDTH == 4) };
     let zero = L::splat(0.0);
     let three = |v: [f64; 3], fourth: f64| L::load(&[v[0], v[1], v[2], fourth]);

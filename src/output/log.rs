@@ -217,7 +217,7 @@ mod tests {
         let size = RunSize { particles: 1_000, steps: 500, threads: 2, bytes: 400_000 };
         let text = cost_table(&Communicator::single(), &times, &size);
         let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap_or_default().to_owned();
-        assert!(line("contacts").contains("50.0%"), "{text}");
+        assert!(line("border contacts").contains("50.0%"), "{text}");
         assert!(line("other").contains("0.500"), "{text}");
         assert!(line("Cundall number").contains("2.5000e5 particle-steps/s, 1.2500e5 per core"), "{text}");
         assert!(line("memory").contains("400 bytes per particle"), "{text}");

@@ -46,7 +46,13 @@ pub fn config(species: Vec<Species>) -> Config {
             orientations: false,
             plots: false,
         },
-        parallel: ParallelConfig { grid: None, threads: None, skin: 0.1, min_particles_per_rank: 1 },
+        parallel: ParallelConfig {
+            grid: None,
+            threads: None,
+            skin: 0.1,
+            min_particles_per_rank: 1,
+            simd: SimdConfig::Auto,
+        },
         title: String::new(),
         resolved: String::new(),
     }

@@ -3,9 +3,9 @@
 use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::observe::{Observation, Observed, Wanted};
-use crate::force::pass::{LineRing, PairPass, PassInput};
+use crate::force::pass::{Job, LineRing, PairPass, PassInput};
 use crate::integrate::gather::Lines;
-use crate::integrate::leap_frog::{self, Slice, StepMotion, StepResult};
+use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
 use crate::state::particles::Record;
 use std::ops::Range;
 
@@ -67,7 +67,7 @@ struct Work<'a> {
     first_section: usize,
 }
 
-impl<'a> Work<'a> {
+impl Work<'_> {
     fn split(self) -> (Self, Self) {
         let middle = self.strips.len() / 2;
         let cut = self.sections.len() / self.strips.len() * middle;
@@ -93,7 +93,7 @@ impl Phase<'_> {
         }
         let section = &mut sections[run.section as usize - first_section];
         let blocks = run.block as usize..(run.block + run.blocks) as usize;
-        let excess = self.passes[section.pair].run(&self.input, records, section, blocks, lines);
+        let excess = self.passes[section.pair].run(Job { input: &self.input, records, section, blocks, lines });
         excess.map(|(place, overlap_ratio)| PassFault { section: run.section as usize, place, overlap_ratio })
     }
 
@@ -214,7 +214,8 @@ impl Phase<'_> {
                 mask,
             };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
-            leap_frog::advance(&mut slice, range, view.offsets, view.ends, &lines, motion, &mut result);
+            let batch = Batch { range, offsets: view.offsets, ends: view.ends, lines, motion };
+            leap_frog::advance(&mut slice, batch, &mut result);
         }
         (result, fault)
     }

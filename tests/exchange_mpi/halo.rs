@@ -1,6 +1,6 @@
 //! The halo against brute force over all particles, ranks and images.
 
-use crate::scene::{SCENES, SPECIES, Scene, TIME_STEP};
+use crate::scene::{ALL, SCENES, SPECIES, Scene};
 use dem_mpi::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, distribute};
 use dem_mpi::state::ContactMemory;
 use dem_mpi::state::particles::Particles;
@@ -39,7 +39,7 @@ fn check_ghosts(scene: &Scene, particles: &Particles, time: u64, velocity_time: 
     for ghost in particles.owned..particles.len() {
         let id = particles.id[ghost];
         let states = [scene.state(id, time), scene.state(id, velocity_time)];
-        let [now, before] = states.map(|state| Particles::from_states(&[state], &SPECIES, TIME_STEP));
+        let [now, before] = states.map(|state| Particles::from_states(&[state], &SPECIES, ALL));
         let mut expected = now.record[0];
         expected.velocity = before.record[0].velocity;
         expected.spin = before.record[0].spin;
@@ -97,7 +97,7 @@ fn check_update(
 ) {
     for own in 0..particles.owned {
         let state = scene.state(particles.id[own], time);
-        let moved = Particles::from_states(&[state], &SPECIES, TIME_STEP);
+        let moved = Particles::from_states(&[state], &SPECIES, ALL);
         particles.record[own] = moved.record[0];
         particles.image[own] = moved.image[0];
     }
@@ -110,7 +110,7 @@ fn check_update(
         .collect();
     let mut wrapped = vec![(7, [7; 3])];
     let content = HaloContent { velocities };
-    let seen = plan.update(comm, particles, content, &mut wrapped, Particles::len);
+    let seen = plan.update(comm, particles, content, &mut wrapped, |particles| particles.len());
     assert_eq!(seen, particles.len());
     assert_eq!(wrapped.into_iter().collect::<BTreeSet<_>>(), expected, "{place}");
     check_ghosts(scene, particles, time, if velocities { time } else { time - 1 }, place);

@@ -1,6 +1,6 @@
 //! Migration and redistribution against what every rank can work out for itself.
 
-use crate::scene::{SCENES, SPECIES, Scene, TIME_STEP, random};
+use crate::scene::{ALL, SCENES, SPECIES, Scene, random};
 use dem_mpi::exchange::redistribute::{block_start, memory_to_id_blocks, to_id_blocks};
 use dem_mpi::exchange::{Communicator, Decomposition, distribute, migrate};
 use dem_mpi::state::particles::Particles;
@@ -31,7 +31,7 @@ fn check_scene(comm: &Communicator, scene: &Scene, decomposition: &Decomposition
     for time in 1..=ROUNDS {
         let states: Vec<_> = particles.id[..particles.owned].iter().map(|&id| scene.state(id, time)).collect();
         let leaving = states.iter().filter(|s| decomposition.owner(s.position, scene.sides) != comm.rank()).count();
-        particles = Particles::from_states(&states, &SPECIES, TIME_STEP);
+        particles = Particles::from_states(&states, &SPECIES, ALL);
         let moved = migrate(comm, &setting, &mut particles, &mut memory).expect("the migration succeeds");
         let mut expected = [leaving as i64];
         comm.sum_i64(&mut expected);
@@ -94,7 +94,7 @@ fn check_holdings(
     states.sort_by_key(|state| state.id);
     let expected: Vec<_> = (0..scene.particles).filter(|&id| owned(id)).map(|id| scene.state(id, time)).collect();
     assert_eq!(states, expected);
-    let rebuilt = Particles::from_states(&particles.states(), &SPECIES, TIME_STEP);
+    let rebuilt = Particles::from_states(&particles.states(), &SPECIES, ALL);
     assert_eq!(particles.record, rebuilt.record);
 
     let all = contacts(scene);
@@ -139,7 +139,7 @@ fn check_faults(comm: &Communicator, scene: &Scene) {
     assert!(error.to_string().contains("particle 5 is given twice"), "{error}");
 
     if comm.size() > 1 {
-        let mut lost = Particles::from_states(&particles.states()[1..], &SPECIES, TIME_STEP);
+        let mut lost = Particles::from_states(&particles.states()[1..], &SPECIES, ALL);
         let error = migrate(comm, &setting, &mut lost, &mut memory.clone()).expect_err("particles are missing");
         assert!(error.to_string().contains("lost particles"), "{error}");
     }

@@ -2,11 +2,11 @@
 
 use dem_mpi::exchange::{Communicator, Decomposition, MigrationSetting};
 use dem_mpi::state::ParticleState;
-use dem_mpi::state::particles::SpeciesConstants;
+use dem_mpi::state::particles::{Extras, SpeciesConstants};
 
 pub const SPECIES: [SpeciesConstants; 2] =
     [SpeciesConstants { density: 1000.0, driven: false }, SpeciesConstants { density: 2500.0, driven: true }];
-pub const TIME_STEP: f64 = 1e-3;
+pub const ALL: Extras = Extras { orientation: true, ledger: true };
 
 /// A number in 0 … 1 that depends on its keys alone.
 pub fn random(keys: [u64; 3]) -> f64 {
@@ -49,9 +49,9 @@ impl Scene {
             position,
             radius: self.max_radius * (0.5 + 0.5 * random([u64::from(id), 0, 99])),
             velocity: vector(10),
-            acceleration: vector(20),
+            full_velocity: vector(20),
             spin: vector(30),
-            angular_acceleration: vector(40),
+            full_spin: vector(40),
             orientation: [1.0, draw(50), draw(51), draw(52)],
             ledger: [0, 1, 2, 3, 4, 5, 6].map(|k| draw(60 + k)),
             image: [0, 1, 2].map(|k| (draw(70 + k) * 3.0) as i32 - 1),
@@ -70,7 +70,7 @@ impl Scene {
             decomposition,
             species: &SPECIES,
             sides: self.sides,
-            time_step: TIME_STEP,
+            extras: ALL,
             particles_total: u64::from(self.particles),
             step: 0,
         }

@@ -3,6 +3,7 @@
 
 use super::{Lane, RECORD};
 use crate::state::particles::Record;
+#[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
@@ -72,6 +73,7 @@ unsafe fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
 
 /// Where the numbers of a record begin.
 #[inline(always)]
+#[must_use]
 pub fn address(records: &[Record], index: u32) -> *const f64 {
     (&raw const records[index as usize]).cast()
 }

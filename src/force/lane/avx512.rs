@@ -6,6 +6,7 @@
 use super::avx2::address;
 use super::{Lane, RECORD};
 use crate::state::particles::Record;
+#[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
