@@ -119,6 +119,7 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
             if config.species[row.species as usize].motion == Motion::Free {
                 particle.velocity = row.velocity.unwrap_or(particle.velocity);
                 particle.spin = row.spin.unwrap_or(particle.spin);
+                (particle.full_velocity, particle.full_spin) = (particle.velocity, particle.spin);
             }
             particle
         })
