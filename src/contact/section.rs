@@ -1,4 +1,4 @@
-//! Contacts of one pair of materials in blocks of eight, with their memory.
+//! Contacts of one pair of materials in blocks, with their memory.
 
 use super::shift;
 use bytemuck::{Pod, Zeroable};
@@ -6,10 +6,10 @@ use bytemuck::{Pod, Zeroable};
 /// Contacts per block: the widest lanes.
 pub const BLOCK: usize = 8;
 
-/// A cache line of numbers; keeps buffers aligned.
+/// A number for each contact of a block; keeps buffers aligned to cache lines.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub struct CacheLine(pub [f64; 8]);
+pub struct CacheLine(pub [f64; BLOCK]);
 
 /// What the two ends of the contacts of a section are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct Section {
     pub shift: Vec<u16>,
     /// Memory columns of this pair's law.
     pub columns: usize,
-    /// Memory, a cache line per block and column.
+    /// Memory, the numbers of a block column by column.
     pub memory: Vec<CacheLine>,
 }
 

@@ -74,6 +74,11 @@ pub struct PairTouch<L: Lane> {
     pub min_radius: L,
 }
 
+#[inline(always)]
+fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
+    [L::look_up(&table.axes[0], codes, 0), L::look_up(&table.axes[1], codes, 3), L::look_up(&table.axes[2], codes, 6)]
+}
+
 /// Touch of two spheres a and b, b in the image of its packed shift. The contact point lies on the line of
 /// centres at `R_i − δ R_j/(R_i+R_j)` from i. NaN counts as touching, so that it is found.
 ///
@@ -82,14 +87,7 @@ pub struct PairTouch<L: Lane> {
 #[inline(always)]
 #[must_use]
 pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
-    let image = |table: &ShiftTable| {
-        [
-            L::look_up(&table.axes[0], codes, 0),
-            L::look_up(&table.axes[1], codes, 3),
-            L::look_up(&table.axes[2], codes, 6),
-        ]
-    };
-    let branch = sub(add(b.position, image(&motion.shift)), a.position);
+    let branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
     let distance_squared = dot(branch, branch);
     let sum = a.radius + b.radius;
     let distance = distance_squared.sqrt();
@@ -99,9 +97,12 @@ pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &Ce
     let normal = scale(branch, L::splat(1.0) / distance);
     let [gx, gy, gz] = motion.gradient;
     let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
-    let imposed_velocity = add(image(&motion.shift_velocity), affine);
+    let imposed_velocity = add(image(&motion.shift_velocity, codes), affine);
     let velocity = add(sub(b.velocity, a.velocity), imposed_velocity);
-    let per_sum = L::splat(1.0) / sum;
+    // One division for two: 1/(R_i + R_j) and m_eff = 1/(1/m_i + 1/m_j).
+    let inverse_masses = a.inverse_mass + b.inverse_mass;
+    let both = L::splat(1.0) / (sum * inverse_masses);
+    let per_sum = both * inverse_masses;
     let share = overlap * per_sum;
     let (arm_first, arm_second) = (a.radius - share * b.radius, b.radius - share * a.radius);
     let approach = dot(velocity, normal);
@@ -110,7 +111,7 @@ pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &Ce
         overlap,
         overlap_rate: -approach,
         effective_radius: a.radius * b.radius * per_sum,
-        effective_mass: L::splat(1.0) / (a.inverse_mass + b.inverse_mass),
+        effective_mass: both * sum,
         normal,
         slip_velocity: sub(sub(velocity, scale(normal, approach)), turning),
         relative_spin: sub(b.spin, a.spin),

@@ -6,7 +6,7 @@ use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorR
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Turning, carried_share_of_vector, coulomb_limit, kept_share, stiffness_loss};
+use super::slider::{Turning, carried_share_of_vector, coulomb_limit, stiffness_loss};
 use crate::config::PairConfig;
 
 /// Registry entry.
@@ -146,7 +146,6 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         let turning = Turning::new(touch, self.time_step);
         let radius = normal.contact_radius;
         let last = memory[3 * SPRINGS];
-        let kept = kept_share(radius, last);
         let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
         let limit = coulomb_limit(self.friction, normal.force);
         let mut energies = Energies::zero();
@@ -156,7 +155,7 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         for k in 0..SPRINGS {
             let stiffness = L::splat(self.modulus[k]) * radius;
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            let carried = scale(turning.apply(stored), kept);
+            let carried = turning.apply(stored, radius, last);
             trial[k] = add(carried, scale(half_slip, stiffness * L::splat(self.weight[k])));
             load = add(load, trial[k]);
             let last_stiffness = L::splat(self.modulus[k]) * last;

@@ -210,27 +210,18 @@ impl<C: ContactLaw> LawPass<C> {
         let Job { input, records, section, blocks, lines } = job;
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
-        let last = section.first.len();
-        for block in blocks.clone() {
-            let slot = (lines.first + (block - blocks.start) * BLOCK) & lines.mask;
-            let rows = &mut lines.values[slot * input.stride..(slot + BLOCK) * input.stride];
+        let (start, end) = (blocks.start * BLOCK, blocks.end * BLOCK);
+        for place in (start..end).step_by(L::WIDTH) {
+            let pair = touch::<L>(input, records, section, place);
+            let (block, lane) = (place / BLOCK, place % BLOCK);
+            let slot = ((lines.first + place - start) & lines.mask) * input.stride;
+            let rows = &mut lines.values[slot..slot + L::WIDTH * input.stride];
             let memory = &mut section.memory[block * C::MEMORY..(block + 1) * C::MEMORY];
-            for part in 0..BLOCK / L::WIDTH {
-                let (lane, place) = (part * L::WIDTH, block * BLOCK + part * L::WIDTH);
-                let ahead = place + PREFETCH * BLOCK;
-                if ahead + L::WIDTH <= last {
-                    L::prefetch(records, &section.second[ahead..ahead + L::WIDTH]);
-                }
-                let a = Bodies::<L>::gather(records, &section.first[place..place + L::WIDTH]);
-                let b = Bodies::<L>::gather(records, &section.second[place..place + L::WIDTH]);
-                let pair = geometry::spheres(&a, &b, &section.shift[place..place + L::WIDTH], input.motion);
-                let rows = &mut rows[lane * input.stride..(lane + L::WIDTH) * input.stride];
-                self.contacts::<L, LEDGER>(input, &pair, memory, lane, rows, false);
-                // Written so that NaN counts as a fault.
-                let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
-                if excess.is_none() && L::any(pair.touching & !within) {
-                    excess = first_excess(&pair, input.max_overlap_fraction, place);
-                }
+            self.contacts::<L, LEDGER>(input, &pair, memory, lane, rows, false);
+            // Written so that NaN counts as a fault.
+            let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
+            if excess.is_none() && L::any(pair.touching & !within) {
+                excess = first_excess(pair.touching, pair.touch.overlap, pair.min_radius, input.max_overlap_fraction, place);
             }
         }
         excess
@@ -250,7 +241,8 @@ impl<C: ContactLaw> LawPass<C> {
             } else {
                 self.contacts::<f64, false>(input, &pair, memory, place % BLOCK, rows, true);
             }
-            excess = excess.or_else(|| first_excess(&pair, input.max_overlap_fraction, place));
+            let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
+            excess = excess.or_else(|| first_excess(pair.touching, overlap, radius, input.max_overlap_fraction, place));
         }
         excess
     }
@@ -377,15 +369,27 @@ impl<C: ContactLaw> LawPass<C> {
     }
 }
 
+/// Geometry of the `L::WIDTH` contacts from `place` on; records of later ones are asked for.
+#[inline(always)]
+fn touch<L: Lane>(input: &PassInput, records: &[Record], section: &Section, place: usize) -> PairTouch<L> {
+    let ahead = place + PREFETCH * BLOCK;
+    if ahead + L::WIDTH <= section.second.len() {
+        L::prefetch(records, &section.second[ahead..ahead + L::WIDTH]);
+    }
+    let a = Bodies::<L>::gather(records, &section.first[place..place + L::WIDTH]);
+    let b = Bodies::<L>::gather(records, &section.second[place..place + L::WIDTH]);
+    geometry::spheres(&a, &b, &section.shift[place..place + L::WIDTH], input.motion)
+}
+
 /// The first lane that overlaps too much or is not a number.
 #[cold]
-fn first_excess<L: Lane>(pair: &PairTouch<L>, limit: f64, place: usize) -> Excess {
-    let (mut overlap, mut radius) = ([0.0; BLOCK], [0.0; BLOCK]);
-    pair.touch.overlap.store(&mut overlap);
-    pair.min_radius.store(&mut radius);
+fn first_excess<L: Lane>(touching: L::Mask, overlap: L, radius: L, limit: f64, place: usize) -> Excess {
+    let (mut overlaps, mut radii) = ([0.0; BLOCK], [0.0; BLOCK]);
+    overlap.store(&mut overlaps);
+    radius.store(&mut radii);
     let beyond = |lane: &usize| {
-        let within = overlap[*lane] <= limit * radius[*lane];
-        L::lane(pair.touching, *lane) && !within
+        let within = overlaps[*lane] <= limit * radii[*lane];
+        L::lane(touching, *lane) && !within
     };
-    (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlap[lane] / radius[lane]))
+    (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlaps[lane] / radii[lane]))
 }

@@ -134,7 +134,7 @@ impl RollingLaw for SpringSlider {
         let modulus = L::splat(self.modulus);
         let stiffness = modulus * a * square;
         let stored = [memory[0], memory[1], memory[2]];
-        let carried = scale(Turning::new(touch, self.time_step).apply(stored), kept_share(a, last));
+        let carried = Turning::new(touch, self.time_step).apply(stored, a, last);
         let advance = scale(roll_rate, half * step * stiffness);
         let trial = add(carried, advance);
         let limit = coulomb_limit(self.rolling_friction, normal.force) * touch.effective_radius;

@@ -20,14 +20,22 @@ impl<L: Lane> Turning<L> {
     }
 
     /// The vector after the step. The angle φ about n is taken as arctan φ (third order in Δt).
+    ///
+    /// It shrinks with the stiffness: a spring keeps `min(1, stiffness/last stiffness)` of its force, so that
+    /// unloading creates no energy. A vector without a last stiffness (first touch) is zero.
     #[inline(always)]
     #[must_use]
-    pub fn apply(&self, stored: Vector<L>) -> Vector<L> {
+    pub fn apply(&self, stored: Vector<L>, stiffness: L, last: L) -> Vector<L> {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let projected = sub(stored, scale(self.normal, dot(stored, self.normal)));
         let turned = add(projected, scale(cross(self.normal, projected), self.angle));
         let square = dot(turned, turned);
-        let ratio = (dot(stored, stored) / square).sqrt();
-        scale(turned, L::select(square.greater(L::splat(0.0)), ratio, L::splat(0.0)))
+        // One division for two: |stored|²/|turned|² and stiffness/last.
+        let both = square * last;
+        let inverse = one / both;
+        let stretch = (dot(stored, stored) * last * inverse).sqrt();
+        let kept = (stiffness * square * inverse).min(one);
+        scale(turned, L::select(both.greater(zero), stretch * kept, zero))
     }
 }
 
@@ -50,7 +58,12 @@ pub fn carried_share<L: Lane>(magnitude: L, limit: L) -> L {
 #[inline(always)]
 #[must_use]
 pub fn carried_share_of_vector<L: Lane>(load: Vector<L>, limit: L) -> L {
-    carried_share(dot(load, load).sqrt(), limit)
+    let one = L::splat(1.0);
+    let square = dot(load, load);
+    // False with NaN, which leaves 1.
+    let slides = square.greater(limit * limit);
+    // Most contacts stick; whole lanes of them need no root.
+    if L::any(slides) { L::select(slides, limit / square.sqrt(), one) } else { one }
 }
 
 /// The share of a spring's force that a shrinking contact keeps, `min(1, stiffness/last stiffness)`, so

@@ -30,7 +30,7 @@ impl LineBuffers {
     /// Make room for the lines of a list; what is there is overwritten by the next pass.
     pub fn fit(&mut self, list: &ContactList) {
         let cache_lines = |lines: usize| (lines * self.stride).div_ceil(size_of::<CacheLine>() / size_of::<f64>());
-        let zero = CacheLine([0.0; 8]);
+        let zero = CacheLine([0.0; BLOCK]);
         self.kept.resize(cache_lines(list.kept), zero);
         self.rings.resize_with(list.strips.len(), Vec::new);
         for (ring, strip) in self.rings.iter_mut().zip(&list.strips) {
