@@ -137,6 +137,15 @@ mod tests {
     }
 
     #[test]
+    fn an_elastic_impact_lasts_as_long_as_hertz_says() {
+        // 2.9433 δ_max/v with δ_max = (15 m v²/(16 E √R))^{2/5}.
+        let modulus = 1e9 / (2.0 * (1.0 - 0.3 * 0.3));
+        let expected = 2.943275 * libm::pow(15.0 * MASS / (16.0 * modulus * RADIUS.sqrt()), 0.4);
+        let got = hit("none", "true", 0.5, 8000.0).duration;
+        assert!((got / expected - 1.0).abs() < 1e-3, "{got} s, expected {expected} s");
+    }
+
+    #[test]
     fn the_ledger_closes_with_damping_and_clipping() {
         for damping in ["tsuji", "wahn"] {
             let hit = hit(damping, "true", 0.3, 8000.0);

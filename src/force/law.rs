@@ -1,5 +1,8 @@
 //! The traits of contact laws. A law sees one touch and its own memory and writes nowhere else;
-//! it must not know of lists, ranks or particles.
+//! it must not know of lists, ranks or particles. docs/adding_a_law.md adds one step by step.
+//!
+//! `evaluate` is generic over [`Lane`]: no branch on a lane (choose by `L::select`), no function but those of
+//! [`Lane`]. Lanes that do not touch may hold anything, for example δ < 0; what comes out is thrown away.
 //!
 //! Sign convention (PHYSICS.md section 1): contact (i, j), i the lower global id, normal n from i to
 //! j, overlap δ > 0 in contact. The force on i is `−F_n n + F_t`, on j the opposite; the moment on i
@@ -29,7 +32,7 @@ pub struct Touch<L> {
 }
 
 /// Energies of one touch that the observing pass sums (the plain pass leaves them to the
-/// optimiser to delete).
+/// optimiser to delete). What is held is given as it is now, what is dissipated as this step's share.
 #[derive(Debug, Clone, Copy)]
 pub struct Energies<L> {
     /// Energy held by springs now \[J\].
@@ -102,13 +105,13 @@ pub struct Column {
     pub unit: &'static str,
 }
 
-/// A normal force law.
+/// A normal force law. Its module also holds `ENTRY` and `build` for [`super::registry`].
 pub trait NormalLaw: Copy + Send + Sync + 'static {
     /// Number of memory columns.
     const MEMORY: usize;
     /// Names and units of the memory columns, `MEMORY` of them.
     fn columns(&self) -> Vec<Column>;
-    /// Recompute what depends on the time step \[s\].
+    /// Recompute what depends on the time step \[s\]; called before the first touch and whenever it changes.
     fn prepare(&mut self, time_step: f64);
     /// Force of one touch; `memory` has `MEMORY` entries, all zero at first touch.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;

@@ -3,13 +3,16 @@
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
 pub use super::documentation::table_markdown;
 use super::shear::ShearSprings;
-use super::{hertz, maxwell_zener, mindlin, rolling};
 use crate::config::{MaxwellBranch, PairConfig};
 
-/// From one line per law, the list of laws and the match that builds them. A law's module holds `ENTRY`,
-/// the law as input and documentation see it, and `build`, which hands the concrete law to a visitor.
+/// From one line per law, the list of laws and the match that builds them. The line is the name of the
+/// law's module in `src/force/`, under the law's role. The module holds `ENTRY`, the law as input and
+/// documentation see it, and `build`, which hands the concrete law to a visitor. The name in the input is
+/// `ENTRY.name`. Step by step: docs/adding_a_law.md.
 macro_rules! register {
     (normal: $($normal:ident)*; tangential: $($tangential:ident)*; rolling: $($rolling:ident)*;) => {
+        use super::{$($normal,)* $($tangential,)* $($rolling),*};
+
         static LAWS: &[LawEntry] = &[$($normal::ENTRY,)* $($tangential::ENTRY,)* $($rolling::ENTRY,)*];
 
         /// Builds the pair's normal law and hands it to the visitor.

@@ -77,6 +77,8 @@ pub fn sum(e: &Energies<f64>) -> f64 {
 pub struct Impact {
     /// Exit speed over impact speed.
     pub restitution: f64,
+    /// Time in contact \[s\], to first order in the time step.
+    pub duration: f64,
     /// Largest difference between the ledger and the impact energy, over the impact energy.
     pub ledger_error: f64,
     /// Ledger after the contact.
@@ -89,6 +91,7 @@ pub fn impact<N: NormalLaw>(mut law: N, radius: f64, mass: f64, speed: f64, time
     let mut memory = vec![0.0; N::MEMORY];
     let mut energies = Energies::zero();
     let (mut overlap, mut half_step_speed, mut acceleration) = (speed * time_step, speed, 0.0);
+    let mut duration = time_step;
     let kinetic = |v: f64| 0.5 * mass * v * v;
     let mut ledger_error: f64 = 0.0;
     while overlap > 0.0 {
@@ -100,6 +103,9 @@ pub fn impact<N: NormalLaw>(mut law: N, radius: f64, mass: f64, speed: f64, time
         ledger_error = ledger_error.max((kinetic(synchronised) + sum(&energies) - kinetic(speed)).abs());
         half_step_speed += acceleration * time_step;
         overlap += half_step_speed * time_step;
+        duration += time_step;
     }
-    Impact { restitution: -half_step_speed / speed, ledger_error: ledger_error / kinetic(speed), energies }
+    // The contact ended between the last two steps.
+    duration -= overlap / half_step_speed;
+    Impact { restitution: -half_step_speed / speed, duration, ledger_error: ledger_error / kinetic(speed), energies }
 }

@@ -3,19 +3,31 @@
 use super::*;
 use crate::config::MaxwellBranch;
 use crate::force::lane::portable::Portable;
-
-type Portable8 = Portable<8>;
-use crate::force::registry::{LawChoice, ParameterKind, ParameterValue, Role, laws};
+use crate::force::registry::{LawChoice, PairProperties, ParameterKind, ParameterValue, Role, laws};
 use crate::force::testing::{choice, pair, properties};
 use proptest::prelude::*;
 
+type Portable8 = Portable<8>;
+
 const STEPS: usize = 4;
 
-fn with_branches(count: usize) -> PairConfig {
+fn branches(count: usize) -> PairProperties {
     let branches =
         (0..count).map(|k| MaxwellBranch { modulus: 1e8 * (1 + k) as f64, relaxation_time: 1e-3 * (1 + k) as f64 });
+    properties(1e9, 0.3, branches.collect())
+}
+
+fn with_branches(count: usize) -> PairConfig {
     let name = if count == 0 { "hertz" } else { "maxwell_zener" };
-    pair(properties(1e9, 0.3, branches.collect()), choice(Role::Normal, name, &[]))
+    pair(branches(count), choice(Role::Normal, name, &[]))
+}
+
+/// Every normal law with a pair that it accepts: without Maxwell branches, or with each number of them.
+fn every_normal() -> impl Iterator<Item = PairConfig> {
+    laws().iter().filter(|law| law.role == Role::Normal).flat_map(|law| {
+        let counts = if (law.check)(&branches(0)).is_ok() { 0..=0 } else { 1..=8 };
+        counts.map(move |count| pair(branches(count), law.with_defaults()))
+    })
 }
 
 /// Every combination of a law's choices and flags.
@@ -41,7 +53,7 @@ fn variants(law: LawChoice) -> Vec<LawChoice> {
     all
 }
 
-/// Every pair that the registry can build: branch counts × choices × tangential and rolling parts.
+/// Every pair that the registry can build: normal laws and branch counts × choices × tangential and rolling parts.
 fn every_pair() -> Vec<PairConfig> {
     let choices = |role| {
         let some = laws().iter().filter(move |law| law.role == role).flat_map(|law| variants(law.with_defaults()));
@@ -49,8 +61,7 @@ fn every_pair() -> Vec<PairConfig> {
     };
     let (tangential, rolling) = (choices(Role::Tangential), choices(Role::Rolling));
     let mut pairs = Vec::new();
-    for count in 0..=8 {
-        let base = with_branches(count);
+    for base in every_normal() {
         for normal in variants(base.normal.clone()) {
             for tangential in &tangential {
                 for rolling in &rolling {
