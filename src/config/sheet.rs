@@ -66,7 +66,7 @@ impl Estimate {
         let count: f64 = config.species.iter().map(|s| s.count as f64).sum();
         let solid_volume: f64 = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
         let solid_fraction = match (config.cell.sides, &config.packing) {
-            (Some(_), PackingConfig::File { .. }) => None,
+            (_, PackingConfig::File { .. }) => None,
             (Some(sides), PackingConfig::RandomClose { .. }) => Some(solid_volume / (sides[0] * sides[1] * sides[2])),
             (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
