@@ -244,6 +244,15 @@ pub fn resident_bytes() -> u64 {
     pages * 4096
 }
 
+/// Largest resident memory that this process has had \[B\]; 0 where the system does not say.
+#[must_use]
+pub fn peak_resident_bytes() -> u64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+    kilobytes.unwrap_or(0) * 1024
+}
+
 /// Row number `written` is due at `written` intervals.
 #[must_use]
 pub fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
