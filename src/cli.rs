@@ -126,7 +126,7 @@ pub fn main() -> i32 {
                 println!("{}", file.display());
             }
         }),
-        Command::Bench(options) => bench::main(&options),
+        Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
         Command::Scaling(options) => scaling::main(&options),
         Command::Verify { filter } => return verify::main(filter.as_deref()),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),

@@ -27,14 +27,23 @@ const QUEUE: &str = "#!/bin/bash\necho \"$(basename \"$0\") $*\" >>queued\n";
 /// Stands for `qstat -f`: a limit of 302 s.
 const STATUS: &str = "#!/bin/bash\necho '    Resource_List.walltime = 00:05:02'\n";
 
+/// Stands for `dem-mpi`: notes one argument a line.
+const PROGRAM: &str = "#!/bin/bash\nprintf '%s\\n' \"$@\" >started\nexit \"${FAKE_CODE:-0}\"\n";
+
 struct Cluster(TempDir);
 
 impl Cluster {
     fn new() -> Self {
         let cluster = Self(tempfile::tempdir().expect("temporary folder"));
         fs::create_dir(cluster.path("bin")).expect("folder");
-        let commands =
-            [("srun", LAUNCHER), ("mpirun", LAUNCHER), ("scontrol", QUEUE), ("qsub", QUEUE), ("qstat", STATUS)];
+        let commands = [
+            ("srun", LAUNCHER),
+            ("mpirun", LAUNCHER),
+            ("scontrol", QUEUE),
+            ("qsub", QUEUE),
+            ("qstat", STATUS),
+            ("dem-mpi", PROGRAM),
+        ];
         for (name, text) in commands {
             let file = cluster.path("bin").join(name);
             fs::write(&file, text).expect("write");
@@ -129,4 +138,36 @@ fn pbs_job_keeps_its_own_time_and_queues_a_following_job() {
         "-n 4 --map-by slot:PE=4 --bind-to core dem-mpi configs/demo.toml --output runs/demo --threads 4 --restart \
          runs/demo"
     );
+}
+
+#[test]
+fn scaling_jobs_grow_to_all_tasks_and_launch_with_srun() {
+    for (kind, particles) in [("strong", "10000000"), ("weak", "100000")] {
+        let cluster = Cluster::new();
+        let script = format!("{kind}_scaling.sh");
+        let mut job = cluster.start(&script, &[], &[("SLURM_NTASKS", "12")]);
+        assert_eq!(job.wait().expect("wait").code(), Some(0));
+        let started = cluster.text("started");
+        let expected = [
+            "bench",
+            &format!("--{kind}"),
+            "--particles",
+            particles,
+            "--layouts",
+            "1x4,2x4,4x4,8x4,12x4",
+            "--output",
+            &format!("bench-{kind}"),
+            "--launcher",
+            "srun -n {ranks} -c {threads} --cpu-bind=cores",
+        ];
+        assert_eq!(started.lines().collect::<Vec<_>>(), expected);
+
+        let arguments = ["5000", "out", "--repeats", "1"];
+        let mut job = cluster.start(&script, &arguments, &[("SLURM_NTASKS", "1"), ("FAKE_CODE", "3")]);
+        assert_eq!(job.wait().expect("wait").code(), Some(3), "a failure is passed on");
+        let started = cluster.text("started");
+        let lines: Vec<&str> = started.lines().collect();
+        assert_eq!([lines[3], lines[5], lines[7]], ["5000", "1x4", "out"]);
+        assert_eq!(lines[lines.len() - 2..], ["--repeats", "1"]);
+    }
 }

@@ -192,14 +192,17 @@ static RANDOM_CLOSE: Table = Table {
 };
 
 static FILE: Table = Table {
-    meaning: "Particles from a file; the cell's `sides` must be given.",
+    meaning: "Particles from a file. For CSV and HDF5 the cell's `sides` must be given; a LAMMPS data file has its own.",
     keys: &[
         key(
             "path",
             Kind::Text,
             Required,
-            "CSV or HDF5 file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
-             optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s.",
+            "CSV, HDF5 or LAMMPS data file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m and \
+         optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s. LAMMPS data file \
+         (.data, .lmp, or any name if a line `N atoms` is near its beginning): atom_style sphere, SI units, upright \
+         box, ids 1 to N in any order; type 1 is the first species, type 2 the second; densities must be those of the \
+         materials.",
         ),
         REPLICATE,
         PERTURBATION,

@@ -89,7 +89,7 @@ pub enum Boundary {
 /// The cell: a box with its low corner at the origin.
 #[derive(Debug, Clone)]
 pub struct CellConfig {
-    /// Sides \[m\]; `None`: a box with proportions `aspect` sized from `solid_fraction`.
+    /// Sides \[m\]; `None`: a box with proportions `aspect` sized from `solid_fraction`, or that of the file.
     pub sides: Option<[f64; 3]>,
     /// Proportions when the sides follow from the solid fraction.
     pub aspect: [f64; 3],
@@ -231,7 +231,7 @@ pub enum PackingConfig {
         /// Give up after this many moves per particle.
         max_moves_per_particle: f64,
     },
-    /// From a CSV or HDF5 file.
+    /// From a CSV, HDF5 or LAMMPS data file.
     File {
         /// Path as resolved against the configuration's folder.
         path: PathBuf,

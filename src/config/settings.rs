@@ -99,11 +99,11 @@ const DENSEST: f64 = 0.7405;
 /// Whether cell, packing and particles fit together.
 pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingConfig, species: &[Species]) {
     let Some(section) = root.reopened("cell") else { return };
-    if let PackingConfig::File { .. } = packing {
-        if cell.sides.is_none() {
+    if let PackingConfig::File { path } = packing {
+        if cell.sides.is_none() && is_table(path) {
             section.problem(
                 "sides",
-                "missing: packing.file needs a cell of given sides",
+                "missing: packing.file with a table needs a cell of given sides",
                 "add sides = [\"…\", \"…\", \"…\"]",
             );
         }
@@ -131,6 +131,12 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
             section.problem("sides", message, "make every side at least one diameter");
         }
     }
+}
+
+/// CSV and HDF5 tables hold no cell; the other formats do.
+fn is_table(path: &Path) -> bool {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    matches!(extension.as_deref(), Some("csv" | "h5" | "hdf5"))
 }
 
 /// Read `[time_step]`.

@@ -68,7 +68,7 @@ impl Estimate {
         let volumes = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume());
         let solid_volume: f64 = copies * volumes.sum::<f64>();
         let solid_fraction = match (config.cell.sides, &config.packing) {
-            (Some(_), PackingConfig::File { .. }) => None,
+            (_, PackingConfig::File { .. }) => None,
             (Some(sides), PackingConfig::RandomClose { .. }) => {
                 Some(solid_volume / (copies * sides[0] * sides[1] * sides[2]))
             }

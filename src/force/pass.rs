@@ -221,7 +221,8 @@ impl<C: ContactLaw> LawPass<C> {
             // Written so that NaN counts as a fault.
             let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
             if excess.is_none() && L::any(pair.touching & !within) {
-                excess = first_excess(pair.touching, pair.touch.overlap, pair.min_radius, input.max_overlap_fraction, place);
+                excess =
+                    first_excess(pair.touching, pair.touch.overlap, pair.min_radius, input.max_overlap_fraction, place);
             }
         }
         excess

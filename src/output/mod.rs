@@ -3,7 +3,7 @@
 
 pub mod checkpoint;
 pub mod digest;
-mod files;
+pub(crate) mod files;
 pub mod hdf5_file;
 pub mod history;
 pub mod log;

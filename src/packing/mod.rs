@@ -102,18 +102,14 @@ fn random_close(config: &Config, contraction_rate: f64, max_moves_per_particle: 
 }
 
 fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
-    let sides = config.cell.sides.ok_or_else(|| {
-        Error::Packing(format!(
-            "particles from {} need a cell of given sides; set the sides of the cell",
-            path.display()
-        ))
-    })?;
-    let cell = Cell { sides, periodic: periodic_axes(&config.cell) };
+    let region = file::Region { sides: config.cell.sides, periodic: periodic_axes(&config.cell) };
     let names: Vec<&str> = config.species.iter().map(|species| species.name.as_str()).collect();
-    let particles = file::read(path, &names, &cell)?
+    let file::Contents { sides, rows } = file::read(path, &names, &region)?;
+    let particles = rows
         .into_iter()
         .enumerate()
         .map(|(id, row)| {
+            check_density(config, id, &row).map_err(|message| Error::File { path: path.to_owned(), message })?;
             let mut particle = at_rest_in_its_species(config, id, row.species, row.position, row.radius);
             // What is prescribed stays prescribed, whatever the file says.
             if config.species[row.species as usize].motion == Motion::Free {
@@ -121,10 +117,26 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
                 particle.spin = row.spin.unwrap_or(particle.spin);
                 (particle.full_velocity, particle.full_spin) = (particle.velocity, particle.spin);
             }
-            particle
+            Ok(particle)
         })
-        .collect();
+        .collect::<Result<_>>()?;
     Ok(Packing { sides, particles })
+}
+
+/// Densities belong to materials: one in the file must be the material's, scaled or not.
+fn check_density(config: &Config, id: usize, row: &file::Row) -> std::result::Result<(), String> {
+    let Some(density) = row.density else { return Ok(()) };
+    let species = &config.species[row.species as usize];
+    let material = &config.materials[species.material];
+    let known = [material.density, material.density * material.density_scaling];
+    if known.iter().any(|known| (density - known).abs() <= 1e-6 * known) {
+        return Ok(());
+    }
+    Err(format!(
+        "particle {id} (species {}) has the density {density} kg/m3, its material {} {} kg/m3 and density_scaling {}; \
+         set the material's density to that of the file",
+        species.name, material.name, material.density, material.density_scaling
+    ))
 }
 
 /// A particle with the initial velocity and spin of its species and nothing behind it.

@@ -74,3 +74,36 @@ fn a_file_gives_particles_with_the_motion_of_file_or_species() {
     let message = build(&given).unwrap_err().to_string();
     assert!(message.contains("particles 0 and 1 overlap"), "{message}");
 }
+
+#[test]
+fn a_data_file_brings_its_cell_and_must_have_the_density_of_the_material() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.data");
+    let text =
+        "title\n\n1 atoms\n1 atom types\n\n0 1 xlo xhi\n0 2 ylo yhi\n0 3 zlo zhi\n\nAtoms\n\n1 1 0.5 5000 0 0 0\n";
+    std::fs::write(&path, text).unwrap();
+    let mut given = config(equal(0));
+    given.packing = PackingConfig::File { path };
+    for (density, scaling, fits) in [(5000.0, 1e8, true), (50.0, 100.0, true), (1800.0, 1.0, false)] {
+        given.materials = vec![crate::config::Material {
+            name: "grain".into(),
+            density,
+            density_scaling: scaling,
+            young_modulus: 1.0,
+            poisson_ratio: 0.25,
+            maxwell: Vec::new(),
+            yield_stress: None,
+            friction: 0.0,
+            restitution: 1.0,
+            rolling_friction: 0.0,
+            twisting_friction: 0.0,
+        }];
+        match build(&given) {
+            Ok(packing) => assert!(fits && packing.sides == [1.0, 2.0, 3.0]),
+            Err(error) => {
+                let message = error.to_string();
+                assert!(!fits && message.contains("density 5000") && message.contains("1800"), "{message}");
+            }
+        }
+    }
+}

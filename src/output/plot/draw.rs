@@ -20,6 +20,8 @@ pub struct Curve {
 const SIZE: (u32, u32) = (1200, 800);
 /// Pixels of a PNG per unit of [`SIZE`]: lines have whole-pixel corners, which show at one.
 const PNG_SCALE: u32 = 2;
+/// Points of so short a curve are marked.
+const MARKED_POINTS: usize = 16;
 const FONT: &str = "sans-serif";
 /// Distinct also for colour-blind readers (Okabe and Ito, Color Universal Design, 2008).
 const COLOURS: [RGBColor; 8] = [
@@ -126,6 +128,10 @@ fn chart<B: DrawingBackend>(
         let style = colour.stroke_width(size(3));
         let mut label = Some(curve.label.as_str());
         for run in curve.points.split(|point| !finite(point)).filter(|run| !run.is_empty()) {
+            if run.len() <= MARKED_POINTS {
+                let dot = |point: &(f64, f64)| Circle::new(*point, size(6), colour.filled());
+                chart.draw_series(run.iter().map(dot)).map_err(text)?;
+            }
             let series = chart.draw_series(LineSeries::new(run.iter().copied(), style)).map_err(text)?;
             if let Some(label) = label.take() {
                 let length = size(34) as i32;

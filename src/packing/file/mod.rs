@@ -1,9 +1,10 @@
-//! Particles from a CSV or HDF5 file: a table with units in its column names. Checks every value and
-//! reports what is wrong with its place in the file.
+//! Particles from a file: CSV or HDF5, a table with units in its column names, or a LAMMPS data file.
+//! Checks every value and reports what is wrong with its place in the file.
 
 mod columns;
 mod csv;
 mod hdf5;
+mod lammps;
 
 use super::grid::Cell;
 use super::rcp::wrap;
@@ -20,13 +21,41 @@ pub struct Row {
     pub position: [f64; 3],
     /// Radius \[m\].
     pub radius: f64,
+    /// Density \[kg/m³\], if the file has it.
+    pub density: Option<f64>,
     /// Velocity \[m/s\], if the file has it.
     pub velocity: Option<[f64; 3]>,
     /// Spin \[rad/s\], if the file has it.
     pub spin: Option<[f64; 3]>,
 }
 
-/// What both formats come down to: columns of equal length, and where each row stands.
+/// The cell as far as it is known before the file is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// Sides \[m\]; `None`: the box of the file.
+    pub sides: Option<[f64; 3]>,
+    /// Periodic axes; the others have walls.
+    pub periodic: [bool; 3],
+}
+
+/// What a file gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contents {
+    /// Sides of the cell \[m\].
+    pub sides: [f64; 3],
+    /// Particles in the order of their ids.
+    pub rows: Vec<Row>,
+}
+
+/// The formats, told apart by the ending of the name, and LAMMPS data files by their text too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Hdf5,
+    Lammps,
+}
+
+/// What the formats of tables come down to: columns of equal length, and where each row stands.
 #[derive(Debug)]
 struct Table {
     columns: Columns,
@@ -40,26 +69,70 @@ struct Table {
 /// So many problems are listed; the rest is counted.
 const MAX_PROBLEMS: usize = 10;
 
-/// Read particles; ids follow the order of the rows.
+/// Read particles and, where the file has it, their cell.
 ///
-/// Columns (CSV, one header line) or datasets in the root group (HDF5, by the extension `.h5` or
+/// **LAMMPS data file** (by the extension `.data` or `.lmp`, or by its line `N atoms`), `atom_style sphere`
+/// in SI units: atom `id` becomes particle `id − 1`, type `t` the `t`-th species, the box is the cell with
+/// its low corner moved to the origin. Image flags are read over.
+///
+/// **Tables**: ids follow the order of the rows. Columns (CSV, one header line) or datasets in the root group (HDF5, by the extension `.h5` or
 /// `.hdf5`): `species` (a name), `x_m`, `y_m`, `z_m`, `radius_m`, and, each as a complete triple or
 /// not at all, `vx_m_per_s` … and `wx_rad_per_s` …. Lengths also with the unit `mm`, `um` or `nm`,
 /// velocities with `mm_per_s`, `um_per_s` or `nm_per_s`. Lines that begin with `#` are comments.
 /// Positions beyond a periodic face are wrapped.
 ///
 /// # Errors
-/// [`Error::File`] with line, column, value and remedy of every problem (the first ten).
-pub fn read(path: &Path, species: &[&str], cell: &Cell) -> Result<Vec<Row>> {
+/// [`Error::File`] with line, column, value and remedy of every problem (the first ten); a box that is not
+/// that of `region`; a table without sides in `region`.
+pub fn read(path: &Path, species: &[&str], region: &Region) -> Result<Contents> {
+    let read = format(path).and_then(|format| match format {
+        Format::Lammps => lammps::read(path, species, region),
+        Format::Csv | Format::Hdf5 => from_table(&table(path, format)?, species, region),
+    });
+    read.map_err(|message| Error::File { path: path.to_owned(), message })
+}
+
+/// Names for the species of a file, for callers that have no input: the names in a table, in the order of
+/// their first use, or the numbers of the types of a LAMMPS data file.
+///
+/// # Errors
+/// [`Error::File`] as for [`read`].
+pub fn species_names(path: &Path) -> Result<Vec<String>> {
+    let names = format(path).and_then(|format| match format {
+        Format::Lammps => lammps::header(path).map(|header| (1..=header.types).map(|t| t.to_string()).collect()),
+        Format::Csv | Format::Hdf5 => table(path, format).map(|table| {
+            let mut seen = std::collections::BTreeSet::new();
+            table.species.into_iter().filter(|name| seen.insert(name.clone())).collect()
+        }),
+    });
+    names.map_err(|message| Error::File { path: path.to_owned(), message })
+}
+
+fn format(path: &Path) -> std::result::Result<Format, String> {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_lowercase();
-    let table = match extension.as_str() {
-        "h5" | "hdf5" => hdf5::read(path),
-        "csv" => csv::read(path),
-        _ => Err("particles are read from .csv, .h5 and .hdf5 files; rename or convert the file".into()),
+    match extension.as_str() {
+        "h5" | "hdf5" => Ok(Format::Hdf5),
+        "csv" => Ok(Format::Csv),
+        "data" | "lmp" => Ok(Format::Lammps),
+        _ if lammps::recognise(path) => Ok(Format::Lammps),
+        _ => Err(
+            "particles are read from .csv, .h5 and .hdf5 files and from LAMMPS data files (.data, .lmp); rename or \
+                  convert the file"
+                .into(),
+        ),
+    }
+}
+
+fn table(path: &Path, format: Format) -> std::result::Result<Table, String> {
+    if format == Format::Hdf5 { hdf5::read(path) } else { csv::read(path) }
+}
+
+fn from_table(table: &Table, species: &[&str], region: &Region) -> std::result::Result<Contents, String> {
+    let Some(sides) = region.sides else {
+        return Err("a table says nothing of the cell; set the `sides` of the cell in the input".into());
     };
-    table
-        .and_then(|table| rows(&table, species, cell))
-        .map_err(|message| Error::File { path: path.to_owned(), message })
+    let cell = Cell { sides, periodic: region.periodic };
+    rows(table, species, &cell).map(|rows| Contents { sides, rows })
 }
 
 fn rows(table: &Table, species: &[&str], cell: &Cell) -> std::result::Result<Vec<Row>, String> {
@@ -98,7 +171,7 @@ impl Table {
             return None;
         }
         let position = [0, 1, 2].map(|k| if cell.periodic[k] { wrap(position[k], cell.sides[k]) } else { position[k] });
-        Some(Row { species: species_index? as u32, position, radius, velocity, spin })
+        Some(Row { species: species_index? as u32, position, radius, density: None, velocity, spin })
     }
 }
 

@@ -2,7 +2,7 @@ use super::*;
 use ::hdf5::types::{FixedAscii, VarLenUnicode};
 use std::path::PathBuf;
 
-const CELL: Cell = Cell { sides: [1.0, 1.0, 1.0], periodic: [true, true, false] };
+const CELL: Region = Region { sides: Some([1.0; 3]), periodic: [true, true, false] };
 
 fn write(text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -13,7 +13,7 @@ fn write(text: &str) -> (tempfile::TempDir, PathBuf) {
 
 fn read_text(text: &str) -> Result<Vec<Row>> {
     let (_folder, path) = write(text);
-    read(&path, &["active", "binder"], &CELL)
+    read(&path, &["active", "binder"], &CELL).map(|contents| contents.rows)
 }
 
 fn assert_refused(text: &str, expected: &[&str]) {
@@ -28,7 +28,8 @@ fn a_table_gives_particles_in_the_order_of_its_rows() {
     let rows =
         read_text("species, x_m, y_m, z_m, radius_m\nbinder, 0.1, 0.2, 0.3, 0.05\n# note\nactive,1e-1,0,0.5,.25\n");
     let rows = rows.unwrap();
-    let expected = Row { species: 1, position: [0.1, 0.2, 0.3], radius: 0.05, velocity: None, spin: None };
+    let expected =
+        Row { species: 1, position: [0.1, 0.2, 0.3], radius: 0.05, density: None, velocity: None, spin: None };
     assert_eq!(rows[0], expected);
     assert_eq!((rows[1].species, rows[1].position, rows[1].radius), (0, [0.1, 0.0, 0.5], 0.25));
 }
@@ -85,7 +86,7 @@ fn missing_and_foreign_files_are_refused() {
     let message = read(&text, &[], &CELL).unwrap_err().to_string();
     assert!(message.contains("not a readable HDF5 file"), "{message}");
     let message = read(&folder.path().join("particles.txt"), &[], &CELL).unwrap_err().to_string();
-    assert!(message.contains(".csv, .h5 and .hdf5"), "{message}");
+    assert!(message.contains(".csv, .h5 and .hdf5 files and from LAMMPS"), "{message}");
 }
 
 fn write_hdf5(path: &Path, radii: &[f32]) -> ::hdf5::File {
@@ -111,7 +112,7 @@ fn hdf5_tables_read_like_csv_whatever_kind_of_string() {
             file.new_dataset_builder().with_data(&names).create("species").unwrap();
         }
         drop(file);
-        let rows = read(&path, &["active", "binder"], &CELL).unwrap();
+        let rows = read(&path, &["active", "binder"], &CELL).unwrap().rows;
         assert_eq!((rows[0].species, rows[1].species), (1, 0));
         assert_eq!((rows[1].position, rows[1].radius), ([0.5; 3], 0.25e-6));
     }

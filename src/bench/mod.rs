@@ -1,0 +1,171 @@
+//! `dem-mpi bench`: speed on jammed periodic packings under uniaxial compression.
+//!
+//! With `--packing` one packing is timed on the ranks of this process. Otherwise packings are made, and
+//! every combination of size and layout runs in a process of its own (repeats interleaved, medians
+//! shown): a table, or a study of strong or weak scaling.
+
+mod case;
+mod data;
+mod launch;
+mod make;
+mod scaling;
+mod workload;
+
+use crate::error::{Error, Result};
+use crate::exchange::Communicator;
+use clap::Args;
+use launch::{Layout, Measurement, Series};
+use make::Plan;
+use std::path::{Path, PathBuf};
+use workload::Law;
+
+/// Options of `dem-mpi bench`.
+#[derive(Debug, Clone, Args)]
+pub struct BenchOptions {
+    /// Numbers of particles; with --weak per core.
+    #[arg(long, value_delimiter = ',')]
+    particles: Vec<usize>,
+    /// Layouts as RANKSxTHREADS.
+    #[arg(long, value_delimiter = ',')]
+    layouts: Vec<Layout>,
+    /// Repeats of each combination.
+    #[arg(long, default_value_t = 3)]
+    repeats: usize,
+    /// Steps to time; by itself some seconds' worth.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Steps before the timed ones.
+    #[arg(long)]
+    warm: Option<u64>,
+    /// Normal law.
+    #[arg(long, value_enum, default_value_t = Law::Hertz)]
+    law: Law,
+    /// Largest over smallest radius of packings made here.
+    #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
+    radii: f64,
+    /// Time this packing (CSV, HDF5, LAMMPS data file) on the ranks of this process, as `mpirun -n N` started them.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["particles", "layouts", "radii", "strong", "weak", "write_data"])]
+    packing: Option<PathBuf>,
+    /// Repeat the packing along each axis.
+    #[arg(long, value_name = "AxBxC", requires = "packing")]
+    copies: Option<String>,
+    /// Sides of the cell in m, for packings that do not hold them.
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, requires = "packing")]
+    sides: Option<Vec<f64>>,
+    /// Threads per rank with --packing.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// Make a packing of --particles spheres and write it as a LAMMPS data file; times nothing.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["strong", "weak"])]
+    write_data: Option<PathBuf>,
+    /// Strong scaling: one size on growing layouts; table and pictures in --output.
+    #[arg(long, conflicts_with = "weak")]
+    strong: bool,
+    /// Weak scaling: a size per core on growing layouts; table and pictures in --output.
+    #[arg(long)]
+    weak: bool,
+    /// Folder for tables, pictures and the packings made [default: bench-strong, bench-weak, or none]
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Command before the program, with {ranks} and {threads}, split at blanks [default: mpirun, ranks bound to cores
+    /// where there are enough].
+    #[arg(long, value_name = "COMMAND")]
+    launcher: Option<String>,
+}
+
+/// Run the bench.
+///
+/// # Errors
+/// A packing cannot be made, read or written, or a case cannot be started or fails.
+pub fn main(comm: &Communicator, options: &BenchOptions) -> Result<()> {
+    if let Some(path) = &options.packing {
+        return case::run(comm, path, options);
+    }
+    if comm.size() > 1 {
+        return Err(Error::Input(
+            "this bench starts its ranks itself: run it without mpirun and choose --layouts, or time one packing on the \
+             ranks of this process with --packing FILE"
+                .into(),
+        ));
+    }
+    make::checked_ratio(options.radii)?;
+    if options.particles.contains(&0) {
+        return Err(Error::Input("--particles 0: give numbers above 0, for example 10000".into()));
+    }
+    if let Some(path) = &options.write_data {
+        let &[particles] = &options.particles[..] else {
+            return Err(Error::Input("--write-data FILE needs one --particles N".into()));
+        };
+        let plan = Plan::new(particles);
+        make::write(path, plan, true, options.radii)?;
+        println!("{} spheres in {}", plan.particles(), path.display());
+        return Ok(());
+    }
+    if options.strong || options.weak { scaling::study(options) } else { table(options) }
+}
+
+fn table(options: &BenchOptions) -> Result<()> {
+    let sizes = if options.particles.is_empty() { vec![250, 10_000, 100_000] } else { options.particles.clone() };
+    let layouts = match &options.layouts[..] {
+        [] => vec![Layout { ranks: 1, threads: 1 }, Layout { ranks: 1, threads: 2 }, Layout { ranks: 2, threads: 1 }],
+        given => given.to_vec(),
+    };
+    let folder = launch::Folder::new(options.output.as_deref())?;
+    println!(
+        "{:>10} {:>7} {:>16} {:>19} {:>13} {:>11} {:>7} {:>11} {:>11}",
+        "particles", "layout", "particle-steps/s", "min - max", "contacts/s", "ns/contact", "Z", "B/particle", "peak"
+    );
+    for size in sizes {
+        let plan = Plan::new(size);
+        let file = base_packing(folder.path(), plan, options.radii)?;
+        let mut series = vec![Series::default(); layouts.len()];
+        for _ in 0..options.repeats.max(1) {
+            for (layout, series) in layouts.iter().zip(&mut series) {
+                series.add(launch::measure(&file, plan.copies, *layout, options)?);
+            }
+        }
+        for (layout, series) in layouts.iter().zip(&series) {
+            let Measurement { particles, rate, contacts, per_contact, coordination, bytes, peak_bytes, .. } =
+                series.median();
+            let [low, high] = series.range().map(|rate| format!("{rate:.3e}"));
+            println!(
+                "{particles:>10} {:>7} {rate:>16.4e} {low:>9}-{high:>9} {contacts:>13.4e} {per_contact:>11.2} \
+                 {coordination:>7.3} {bytes:>11.0} {peak_bytes:>11.0}",
+                layout.to_string()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// The base of a plan as a file of the folder, made if it is not there.
+fn base_packing(folder: &Path, plan: Plan, ratio: f64) -> Result<PathBuf> {
+    let path = folder.join(format!("base-{}-radii-{ratio}.data", plan.base));
+    if !path.exists() {
+        make::write(&path, plan, false, ratio)?;
+    }
+    Ok(path)
+}
+
+fn parse_copies(text: Option<&str>) -> Result<[usize; 3]> {
+    let Some(text) = text else { return Ok([1; 3]) };
+    let numbers: Vec<usize> = text.split('x').filter_map(|part| part.parse().ok().filter(|n| *n > 0)).collect();
+    match numbers[..] {
+        [a, b, c] if text.matches('x').count() == 2 => Ok([a, b, c]),
+        _ => Err(Error::Input(format!("--copies {text:?}: give three numbers above 0, for example 2x2x1"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_are_three_numbers() {
+        assert_eq!(parse_copies(Some("2x3x1")).ok(), Some([2, 3, 1]));
+        assert_eq!(parse_copies(None).ok(), Some([1; 3]));
+        for text in ["2", "2x2", "2x2x0", "2xx2x2", "axbxc", "1x1x1x"] {
+            assert!(parse_copies(Some(text)).is_err(), "{text}");
+        }
+    }
+}
