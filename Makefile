@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench build install docs serial static setup setup-test
+.PHONY: help demo test lint bench bench-peers build install docs serial static setup setup-test
 
 # Before each command: PATH, root and HDF5 as this machine needs them.
 ENVIRONMENT := . scripts/environment.sh; hdf5_dir=$$(parallel_hdf5_dir); \
@@ -18,6 +18,7 @@ help:
 	@echo "make test       the same set-up, then all tests"
 	@echo "make lint       formatting, clippy, architecture, scripts"
 	@echo "make bench      particle-steps/s on one and two ranks and threads"
+	@echo "make bench-peers  the same packings in LAMMPS and LIGGGHTS"
 	@echo "make build      build the program"
 	@echo "make install    build and copy dem-mpi into cargo's bin folder"
 	@echo "make docs       write docs/input.md anew from the program"
@@ -54,6 +55,10 @@ lint: setup
 # BENCH="--particles 1000000 --layouts 2x1" narrows or widens it.
 bench: build
 	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" bench $(BENCH)
+
+# SIZES="10000" RANKS="1" REPEATS=5 narrow it; LAMMPS_NATIVE=/path/to/lmp adds a LAMMPS of your own.
+bench-peers: build
+	@$(ENVIRONMENT) scripts/bench_peers.sh "$(TARGET)/release/dem-mpi"
 
 docs: build
 	@mkdir -p docs; { echo "# Input reference"; echo; echo "Written by \`make docs\` from the program's own tables."; echo; \

@@ -80,6 +80,35 @@ fn threads_that_share_the_work_give_the_same_bits() {
 }
 
 #[test]
+fn vector_instructions_give_the_same_bits() {
+    // What this processor lacks is an input error, which the test passes over but for the scalar reference.
+    let available = |level: &str| match level {
+        #[cfg(target_arch = "x86_64")]
+        "avx2" => is_x86_feature_detected!("avx2"),
+        #[cfg(target_arch = "x86_64")]
+        "avx512" => is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl"),
+        level => level == "auto",
+    };
+    for (config, extra) in [
+        ("mixed_flow.toml", &[][..]),
+        ("mixed_flow.toml", &["--set", "output.energy_ledger=true", "--set", "output.orientations=true"]),
+        ("walls.toml", &[]),
+        ("dense_box.toml", &[]),
+    ] {
+        let config = data(config);
+        let run = Run { config: &config, ranks: 1, threads: 1 };
+        let with = |level: &str| {
+            let level = format!("parallel.simd={level}");
+            outcome("simd", &run, &[extra, &["--set", &level]].concat())
+        };
+        let reference = with("scalar");
+        for level in ["auto", "avx2", "avx512"].into_iter().filter(|level| available(level)) {
+            assert_eq!(with(level), reference, "{level}, {extra:?}");
+        }
+    }
+}
+
+#[test]
 fn two_spheres_in_a_cell_of_one_diameter_have_the_same_bits_over_ranks() {
     // Own images and several images of one partner (W Fig. 8), over subdomains thinner than a sphere.
     let config = common::root().join("configs/two_spheres.toml");
