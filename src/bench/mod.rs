@@ -50,7 +50,7 @@ pub struct BenchOptions {
     #[arg(long, value_name = "AxBxC", requires = "packing")]
     copies: Option<String>,
     /// Sides of the cell in m, for packings that do not hold them.
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, requires = "packing")]
+    #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, requires = "packing")]
     sides: Option<Vec<f64>>,
     /// Threads per rank with --packing.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
