@@ -106,7 +106,6 @@ pub struct ContactList {
     pub offsets: Vec<u32>,
     /// Ends of all particles.
     pub ends: Vec<End>,
-    keyed: Vec<(u64, End)>,
 }
 
 impl ContactList {
@@ -231,7 +230,7 @@ impl ContactList {
 
     fn order_ends(&mut self, particles: &Particles, total: u32) {
         let locals = particles.len();
-        let Self { sections, runs, offsets, ends, keyed, .. } = self;
+        let Self { sections, runs, offsets, ends, .. } = self;
         offsets.clear();
         offsets.resize(locals + 2, 0);
         // Counted two places on, so that filling leaves the starts where they belong.
@@ -246,8 +245,8 @@ impl ContactList {
         for particle in 0..locals {
             offsets[particle + 2] += offsets[particle + 1];
         }
-        keyed.clear();
-        keyed.resize(offsets[locals + 1] as usize, (0, End(0)));
+        // Not kept: it is larger than the list itself.
+        let mut keyed = vec![(0_u64, End(0)); offsets[locals + 1] as usize];
         let mut place_end = |particle: usize, key: u64, end: End| {
             let slot = &mut offsets[particle + 1];
             keyed[*slot as usize] = (key, end);
@@ -271,7 +270,7 @@ impl ContactList {
         offsets.pop();
         ends.clear();
         ends.resize(keyed.len(), End(0));
-        sort_ends(offsets, keyed, ends);
+        sort_ends(offsets, &mut keyed, ends);
     }
 }
 
