@@ -201,7 +201,7 @@ impl Phase<'_> {
         for chunk in 0..strip.chunks() {
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
-                let lines = LineRing { values: &mut *ring, first: run.line as usize - strip.first_line, mask };
+                let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
                 let found = self.evaluate(run, work.first_section, work.sections, slice.record, lines);
                 fault = fault.or(found);
             }
@@ -210,7 +210,6 @@ impl Phase<'_> {
                 stride: self.input.stride,
                 kept: view.kept,
                 ring: &*ring,
-                first: strip.first_line,
                 mask,
             };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
