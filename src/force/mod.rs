@@ -18,3 +18,4 @@ pub mod simd;
 pub mod slider;
 #[cfg(test)]
 mod testing;
+pub mod touches;

@@ -55,12 +55,16 @@ impl Lines<'_> {
         loads: &mut [[f64; 8]],
     ) {
         const SIGN: [f64; 2] = [1.0, -1.0];
-        let (kept, ring) = (self.kept.as_chunks::<STRIDE>().0, self.ring.as_chunks::<STRIDE>().0);
+        // By table, not by branch: which of the two comes next is anybody's guess.
+        let lines = [self.ring, self.kept].map(|values| values.as_chunks::<STRIDE>().0);
+        let masks = [self.mask, usize::MAX];
+        let kept = lines[1].len();
         for (bounds, load) in offsets.windows(2).zip(loads) {
             let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
             for end in &ends[bounds[0] as usize..bounds[1] as usize] {
                 let number = end.line();
-                let line = if number < kept.len() { &kept[number] } else { &ring[number & self.mask] };
+                let table = usize::from(number < kept);
+                let line = &lines[table][number & masks[table]];
                 let second = usize::from(end.is_second());
                 let sign = L::splat(SIGN[second]);
                 force = force + sign * L::load(&line[..4]);

@@ -8,7 +8,7 @@ use crate::contact::list::{CHUNK, End};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::avx2::F64x4;
 use crate::force::lane::portable::Portable;
-use crate::force::lane::{Lane, RECORD};
+use crate::force::lane::{Lane, RECORD, prefetch};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, Record, padded, trimmed};
@@ -238,6 +238,10 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
     for (index, load) in range.zip(&loads) {
+        // What the next chunk needs and no contact has touched.
+        prefetch(slice.velocity, index + CHUNK, 1);
+        prefetch(slice.spin, index + CHUNK, 1);
+        prefetch(slice.reference, index + CHUNK, 1);
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
         let inverse_mass = L::splat(record[7]);

@@ -83,7 +83,8 @@ impl Particles {
             }
             let mass = sphere_mass(state.radius, constants.density);
             particles.record.push(Record {
-                position: state.position,
+                // Never −0: the contact pass counts on it.
+                position: state.position.map(|x| x + 0.0),
                 radius: state.radius,
                 velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
