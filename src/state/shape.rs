@@ -64,10 +64,12 @@ pub fn smallest_semi_axis(semi_axes: [f64; 3]) -> f64 {
 #[must_use]
 pub fn rotation_matrix(orientation: [f64; 4]) -> [[f64; 3]; 3] {
     let [w, x, y, z] = orientation;
+    // The length is 1 but for rounding; without it momenta that turn to and fro drift.
+    let two = 2.0 / (w * w + x * x + y * y + z * z);
     [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        [1.0 - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)],
+        [two * (x * y + w * z), 1.0 - two * (x * x + z * z), two * (y * z - w * x)],
+        [two * (x * z - w * y), two * (y * z + w * x), 1.0 - two * (x * x + y * y)],
     ]
 }
 
