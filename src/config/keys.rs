@@ -153,6 +153,12 @@ pub static PACKING: Table = Table {
     meaning: "How the initial positions are made.",
     keys: &[
         key("random_close", Kind::Table(&RANDOM_CLOSE), Absent, "Jodrey-Tory random close packing."),
+        key(
+            "relaxation",
+            Kind::Table(&RELAXATION),
+            Absent,
+            "Random packing by relaxation of overlaps, of spheres and ellipsoids.",
+        ),
         key("file", Kind::Table(&FILE), Absent, "Particles from a file."),
     ],
 };
@@ -170,6 +176,24 @@ const PERTURBATION: Key = key(
     ZERO,
     "Every particle is moved at random by at most this fraction of its radius, so that copies differ.",
 );
+
+static RELAXATION: Table = Table {
+    meaning: "Random packing of spheres and ellipsoids in a periodic cell: random places and orientations are compressed \
+              by a pressure that falls step by step, and ends with particles just touching. With a solid fraction \
+              below the one where they jam, overlaps are relaxed in a cell of that size instead.",
+    keys: &[
+        key(
+            "tolerance",
+            number(Dimension::NONE, Range::closed(1e-4, 0.5)),
+            Default::Number(0.03),
+            "Residual force over mean contact force at which a pressure counts as balanced; smaller is a little denser \
+             and slower.",
+        ),
+        key("max_steps", Kind::Integer(1), Default::Integer(50_000), "Give up after this many steps at one pressure."),
+        REPLICATE,
+        PERTURBATION,
+    ],
+};
 
 static RANDOM_CLOSE: Table = Table {
     meaning: "Jodrey-Tory random close packing of spheres in a periodic cell; ends with spheres just touching.",
@@ -344,6 +368,12 @@ pub static OUTPUT: Table = Table {
         key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory."),
         key("history", Kind::Interval, Default::Word("1000 steps"), "A row of history.csv every so often."),
         key("snapshots", Kind::Interval, Absent, "A snapshot every so often; none without it."),
+        key(
+            "dump",
+            Kind::Flag,
+            Default::Flag(false),
+            "Write each snapshot also as a LAMMPS text dump, for OVITO: particles-NUMBER.dump.",
+        ),
         key("snapshot_contacts", Kind::Flag, Default::Flag(false), "Write contacts with force and memory too."),
         key(
             "checkpoint_steps",

@@ -15,12 +15,14 @@ mod resolved;
 pub mod schema;
 mod section;
 mod settings;
+mod shape;
 pub mod sheet;
 mod stages;
 mod values;
 
 pub use build::load;
 pub use reference::{example, reference_markdown};
+pub use shape::ShapeConfig;
 
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;
@@ -192,8 +194,10 @@ pub struct Species {
     pub name: String,
     /// Index into [`Config::materials`].
     pub material: usize,
-    /// Radii.
+    /// Radii; of ellipsoids those of spheres of equal volume.
     pub radius: RadiusDistribution,
+    /// Semi-axes.
+    pub shape: ShapeConfig,
     /// Number of particles (0 when a file gives the particles).
     pub count: usize,
     /// How it moves.
@@ -230,6 +234,13 @@ pub enum PackingConfig {
         contraction_rate: f64,
         /// Give up after this many moves per particle.
         max_moves_per_particle: f64,
+    },
+    /// Relaxation of overlaps under a falling pressure; also for ellipsoids.
+    Relaxation {
+        /// Residual force over mean contact force at which a pressure counts as balanced.
+        tolerance: f64,
+        /// Give up after this many steps at one pressure.
+        max_steps: usize,
     },
     /// From a CSV, HDF5 or LAMMPS data file.
     File {
@@ -330,6 +341,8 @@ pub struct OutputConfig {
     pub snapshots: Option<Interval>,
     /// Also write the contacts as lines with force and memory.
     pub snapshot_contacts: bool,
+    /// Write each snapshot also as a LAMMPS text dump.
+    pub dump: bool,
     /// Checkpoint every this many steps (0: none but the last).
     pub checkpoint_steps: u64,
     /// Checkpoint every this much wall time \[s\].

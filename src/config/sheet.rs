@@ -69,9 +69,7 @@ impl Estimate {
         let solid_volume: f64 = copies * volumes.sum::<f64>();
         let solid_fraction = match (config.cell.sides, &config.packing) {
             (_, PackingConfig::File { .. }) => None,
-            (Some(sides), PackingConfig::RandomClose { .. }) => {
-                Some(solid_volume / (copies * sides[0] * sides[1] * sides[2]))
-            }
+            (Some(sides), _) => Some(solid_volume / (copies * sides[0] * sides[1] * sides[2])),
             (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
         let mut progress = Progress::default();
@@ -90,7 +88,7 @@ impl Estimate {
             }
             stress = stress.max(stage.until_stress.map_or(0.0, |(_, value)| value));
         }
-        let largest = config.species.iter().map(|s| s.radius.max()).fold(0.0, f64::max);
+        let largest = config.species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
         let initial = config.species.iter().map(|s| norm(s.velocity) + 3.0 * s.velocity_deviation).fold(0.0, f64::max);
         let velocity = initial.max(rate * 2.0 * largest);
         let fraction = solid_fraction.unwrap_or(RANDOM_CLOSE);
