@@ -11,7 +11,7 @@ use crate::output::history::HistoryWriter;
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
 use crate::output::plot;
 use crate::output::ranks::{effort_table, rank_table};
-use crate::output::snapshot::{Moment, SnapshotSeries};
+use crate::output::snapshot::{Moment, SnapshotSeries, Style};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
 use std::fs;
@@ -107,7 +107,10 @@ impl RunOutput {
         };
         let history = agree(comm, opened)?;
         let snapshots = match config.output.snapshots {
-            Some(_) => Some(SnapshotSeries::resume(comm, directory, global.snapshots)?),
+            Some(_) => {
+                let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
+                Some(SnapshotSeries::resume(comm, directory, global.snapshots, style)?)
+            }
             None => None,
         };
         Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new), efforts })
