@@ -11,6 +11,7 @@ pub mod maxwell_zener;
 pub mod mindlin;
 pub mod observe;
 pub mod pass;
+pub mod plastic;
 pub mod registry;
 pub mod rolling;
 pub mod shear;
@@ -18,3 +19,4 @@ pub mod simd;
 pub mod slider;
 #[cfg(test)]
 mod testing;
+pub mod thornton;

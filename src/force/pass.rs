@@ -77,6 +77,8 @@ pub trait PairPass: Send + Sync {
     fn stride(&self) -> usize;
     /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
     fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
+    /// Gap over the effective radius up to which contacts keep their memory; 0 if it ends with the touch.
+    fn range(&self) -> f64;
     /// Evaluate some blocks of a section.
     fn run(&self, job: Job) -> Excess;
     /// Look at some blocks of a section without changing anything.
@@ -131,6 +133,9 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             overlap,
             overlap_rate: 0.0,
             effective_radius,
+            radius_factor: 1.0,
+            overlap_factor: 1.0,
+            size: 4.0 * effective_radius,
             effective_mass: 1.0,
             normal: [0.0, 0.0, 1.0],
             slip_velocity: [0.0; 3],
@@ -139,6 +144,10 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         };
         let mut memory = [0.0; MAX_MEMORY];
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
+    }
+
+    fn range(&self) -> f64 {
+        if C::LASTS { self.law.range() } else { 0.0 }
     }
 
     fn run(&self, job: Job) -> Excess {
@@ -193,6 +202,16 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 }
 
 impl<C: ContactLaw> LawPass<C> {
+    /// Lanes whose law is asked: those that touch, and those near enough for a memory that lasts.
+    #[inline(always)]
+    fn alive<L: Lane>(&self, pair: &PairTouch<L>) -> L::Mask {
+        if !C::LASTS {
+            return pair.touching;
+        }
+        let reach = L::splat(-self.law.range()) * pair.touch.effective_radius;
+        pair.touching | pair.touch.overlap.greater(reach)
+    }
+
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn spheres_avx2<const LEDGER: bool>(&self, job: Job) -> Excess {
@@ -260,7 +279,8 @@ impl<C: ContactLaw> LawPass<C> {
         wall: bool,
     ) {
         let zero = L::splat(0.0);
-        if !L::any(pair.touching) {
+        let alive = self.alive(pair);
+        if !L::any(alive) {
             rows.fill(0.0);
             for column in memory {
                 zero.store(&mut column.0[lane..]);
@@ -273,7 +293,7 @@ impl<C: ContactLaw> LawPass<C> {
             values[column] = L::load(&memory[column].0[lane..]);
         }
         let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-        let kept = |value: L| L::select(pair.touching, value, zero);
+        let kept = |value: L| L::select(alive, value, zero);
         for column in 0..C::MEMORY {
             kept(values[column]).store(&mut memory[column].0[lane..]);
         }
@@ -333,7 +353,7 @@ impl<C: ContactLaw> LawPass<C> {
                 values[column] = L::load(&memory[column].0[place % BLOCK..]);
             }
             let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-            stiffness = L::select(pair.touching, response.stiffness, zero).max(stiffness);
+            stiffness = L::select(self.alive(&pair), response.stiffness, zero).max(stiffness);
             ratio = L::select(pair.touching, pair.touch.overlap / pair.min_radius, zero).max(ratio);
         }
         let mut lanes = [0.0; 2 * BLOCK];
@@ -359,13 +379,17 @@ impl<C: ContactLaw> LawPass<C> {
             let (a, b) = (Bodies::gather(records, first), Bodies::gather(records, &section.second[place..=place]));
             geometry::spheres(&a, &b, &section.shift[place..=place], input.motion)
         };
-        if !pair.touching {
+        if !self.alive(&pair) {
             observed.no_touch();
             return;
         }
         let mut memory = [0.0; MAX_MEMORY];
         section.read_memory(place, &mut memory);
         let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
+        if C::LASTS && !response.joined {
+            observed.no_touch();
+            return;
+        }
         observed.touch(section.origin + first[0] as usize, &pair, &response, wall);
     }
 }

@@ -49,7 +49,8 @@ macro_rules! register {
 register! {
     normal:
         hertz
-        maxwell_zener;
+        maxwell_zener
+        thornton;
     tangential:
         mindlin;
     rolling:
