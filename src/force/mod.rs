@@ -1,5 +1,6 @@
 //! Contact laws: pure functions of one touch and that contact's own memory, and the loop around them.
 
+pub mod becker_kamlah;
 pub mod composition;
 pub mod dashpot;
 mod documentation;

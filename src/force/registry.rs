@@ -48,6 +48,7 @@ macro_rules! register {
 
 register! {
     normal:
+        becker_kamlah
         hertz
         maxwell_zener
         thornton;
