@@ -4,6 +4,7 @@ pub mod becker_kamlah;
 pub mod composition;
 pub mod dashpot;
 mod documentation;
+pub mod ellipsoid;
 pub mod geometry;
 pub mod hertz;
 pub mod lane;
