@@ -151,6 +151,7 @@ fn at_rest_in_its_species(config: &Config, id: usize, species: u32, position: [f
         species,
         position,
         radius,
+        semi_axes: [radius; 3],
         velocity,
         full_velocity: velocity,
         spin,

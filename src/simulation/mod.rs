@@ -34,9 +34,6 @@ use lists::ListBudget;
 use std::sync::Arc;
 use strips::{LineBuffers, PassFault, Phase};
 
-/// Every law may damp or rub, so ghosts always carry velocities.
-const GHOSTS: HaloContent = HaloContent { velocities: true };
-
 /// What is constant over a run.
 pub struct Model {
     /// The checked input.
@@ -55,6 +52,8 @@ pub struct Model {
     pub max_radius: f64,
     /// Volume of all particles \[m³\].
     pub solid_volume: f64,
+    /// Some particle is no sphere.
+    pub ellipsoids: bool,
     /// Some particle turns or can be made to turn.
     pub rotation: bool,
     /// Instructions that the passes use.
@@ -72,7 +71,12 @@ impl Model {
     #[must_use]
     pub fn extras(&self) -> Extras {
         let output = &self.config.output;
-        Extras { orientation: output.orientations, ledger: output.energy_ledger }
+        Extras { orientation: output.orientations, ellipsoids: self.ellipsoids, ledger: output.energy_ledger }
+    }
+
+    /// What ghosts bring each step. Every law may damp or rub, so they always carry velocities.
+    fn ghosts(&self) -> HaloContent {
+        HaloContent { velocities: true, orientations: self.ellipsoids }
     }
 
     /// The programme looks at the stress: it steers it or ends a stage by it.
@@ -318,7 +322,8 @@ impl Simulation {
 
     /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
     fn update_ghosts(&mut self) {
-        self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |_| ());
+        let content = self.model.ghosts();
+        self.halo.update(&self.comm, &mut self.particles, content, &mut self.ghost_wraps, |_| ());
         take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
     }
 
@@ -383,7 +388,7 @@ impl Simulation {
             inner_part(particles, contacts, lines, reference, timers)
         } else {
             timers.start(Stage::Halo);
-            halo.update(comm, particles, GHOSTS, ghost_wraps, |particles| {
+            halo.update(comm, particles, model.ghosts(), ghost_wraps, |particles| {
                 let result = inner_part(particles, contacts, lines, reference, timers);
                 timers.start(Stage::Halo);
                 result

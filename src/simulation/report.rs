@@ -8,7 +8,7 @@ use crate::force::observe::{Observation, SUMS, Sample, Sum, Wanted};
 use crate::integrate::time_step::Measured;
 use crate::output::history::HistoryRow;
 use crate::state::LEDGER;
-use crate::state::particles::sphere_mass;
+use crate::state::shape::{ellipsoid_mass, rotational_energy};
 
 /// Particles with fewer contacts than this carry no load in three dimensions (rattlers).
 const RATTLER_CONTACTS: u32 = 4;
@@ -116,8 +116,11 @@ impl Simulation {
                 continue;
             }
             let mass = self.mass(index);
-            let inertia = 0.4 * mass * (record.radius * record.radius);
-            sums[ParticleSum::Kinetic as usize].add(0.5 * (mass * squared + inertia * dot(record.spin)));
+            let kinetic = match self.particles.shape.get(index) {
+                Some(shape) => 0.5 * mass * squared + rotational_energy(mass, shape, record.spin),
+                None => 0.5 * (mass * squared + 0.4 * mass * (record.radius * record.radius) * dot(record.spin)),
+            };
+            sums[ParticleSum::Kinetic as usize].add(kinetic);
             for k in 0..3 {
                 sums[ParticleSum::KineticStress as usize + k].add(mass * (velocity[k] * velocity[k]));
             }
@@ -152,7 +155,7 @@ impl Simulation {
 
     fn mass(&self, particle: usize) -> f64 {
         let species = self.model.species[self.particles.species[particle] as usize];
-        sphere_mass(self.particles.record[particle].radius, species.density)
+        ellipsoid_mass(self.particles.semi_axes(particle), species.density)
     }
 
     /// Sum of all forces on an owned particle at the last look at single contacts \[N\].

@@ -3,6 +3,7 @@
 use super::Simulation;
 use crate::force::observe::Sample;
 use crate::output::snapshot::{SnapshotContact, SnapshotContacts, SnapshotParticle};
+use crate::state::shape::ellipsoid_volume;
 
 impl Simulation {
     /// Owned particles with stress trace and coordination. The trace is that of the mean stress in the
@@ -16,7 +17,7 @@ impl Simulation {
         (0..self.particles.owned)
             .map(|index| {
                 let record = &self.particles.record[index];
-                let volume = 4.0 / 3.0 * std::f64::consts::PI * (record.radius * record.radius * record.radius);
+                let volume = ellipsoid_volume(self.particles.semi_axes(index));
                 let ends = self.contacts.ends_of(index).iter();
                 let virial = ends.fold(0.0, |sum, end| sum + virials[end.line()][usize::from(end.is_second())]);
                 SnapshotParticle {
@@ -24,7 +25,7 @@ impl Simulation {
                     species: self.particles.species[index],
                     position: record.position,
                     radius: record.radius,
-                    orientation: self.particles.state(index).orientation,
+                    orientation: self.particles.orientation_of(index),
                     velocity: record.velocity,
                     angular_velocity: record.spin,
                     stress_trace: virial / volume,

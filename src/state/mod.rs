@@ -1,6 +1,7 @@
 //! What a particle and a contact are: the data that migration, checkpoint and digest carry.
 
 pub mod particles;
+pub mod shape;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,17 +15,21 @@ pub struct ParticleState {
     pub species: u32,
     /// Position, wrapped into the cell \[m\].
     pub position: [f64; 3],
-    /// Radius \[m\].
+    /// Radius of a sphere, largest semi-axis of an ellipsoid \[m\].
     pub radius: f64,
+    /// Semi-axes along the body's x, y, z \[m\]; the radius three times for a sphere.
+    pub semi_axes: [f64; 3],
     /// Velocity at the last half step \[m/s\].
     pub velocity: [f64; 3],
     /// Velocity at the full step, extrapolated with the last acceleration, W (2.3) \[m/s\].
     pub full_velocity: [f64; 3],
-    /// Angular velocity at the last half step \[rad/s\].
+    /// Angular velocity at the last half step \[rad/s\]. Of an ellipsoid: what the angular momentum of that
+    /// half step gives in the present orientation.
     pub spin: [f64; 3],
     /// Angular velocity at the full step \[rad/s\].
     pub full_spin: [f64; 3],
-    /// Orientation, unit quaternion (w, x, y, z); (1, 0, 0, 0) where orientations are not followed.
+    /// Orientation, unit quaternion (w, x, y, z); from body to space; (1, 0, 0, 0) where
+    /// orientations are not followed.
     pub orientation: [f64; 4],
     /// Energy ledger of this particle \[J\], see [`LEDGER`]; zero when the ledger is off.
     pub ledger: [f64; LEDGER.len()],
