@@ -75,7 +75,7 @@ pub struct PairTouch<L: Lane> {
 }
 
 #[inline(always)]
-fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
+pub(super) fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
     [L::look_up(&table.axes[0], codes, 0), L::look_up(&table.axes[1], codes, 3), L::look_up(&table.axes[2], codes, 6)]
 }
 

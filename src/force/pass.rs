@@ -12,7 +12,10 @@ use super::simd::Simd;
 use crate::config::PairConfig;
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
+use crate::state::shape::Shape;
 use std::ops::Range;
+
+mod ellipsoids;
 
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
@@ -25,7 +28,8 @@ const PREFETCH: usize = 6;
 pub struct PassInput<'a> {
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), then the ledger's.
+    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), 16 (two torques, between
+    /// ellipsoids), then the ledger's.
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
@@ -40,8 +44,8 @@ pub struct PassInput<'a> {
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; then
-    /// the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
+    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
+    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
     /// Number of the first block's first line.
     pub first: usize,
@@ -49,13 +53,30 @@ pub struct LineRing<'a> {
     pub mask: usize,
 }
 
+/// Owned particles and ghosts as a pass reads them, from a section's origin on.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyData<'a> {
+    /// Records.
+    pub records: &'a [Record],
+    /// Semi-axes and orientations; empty when every particle of all ranks is a sphere.
+    pub shapes: &'a [Shape],
+}
+
+impl BodyData<'_> {
+    /// From this place on.
+    #[must_use]
+    pub fn from(&self, origin: usize) -> Self {
+        Self { records: &self.records[origin..], shapes: &self.shapes[origin.min(self.shapes.len())..] }
+    }
+}
+
 /// Some blocks of a section to evaluate.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// What all passes share.
     pub input: &'a PassInput<'a>,
-    /// Records of owned particles and ghosts from the section's origin on.
-    pub records: &'a [Record],
+    /// Owned particles and ghosts from the section's origin on.
+    pub bodies: BodyData<'a>,
     /// The section; its memory moves on by one step.
     pub section: &'a mut Section,
     /// Numbers of the blocks.
@@ -85,7 +106,7 @@ pub trait PairPass: Send + Sync {
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
@@ -94,21 +115,25 @@ pub trait PairPass: Send + Sync {
 
 struct LawPass<C> {
     law: C,
+    /// There are ellipsoids.
+    ellipsoids: bool,
 }
 
-struct Builder;
+struct Builder {
+    ellipsoids: bool,
+}
 
 impl LawVisitor for Builder {
     type Output = Box<dyn PairPass>;
     fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        Box::new(LawPass { law })
+        Box::new(LawPass { law, ellipsoids: self.ellipsoids })
     }
 }
 
-/// The pass for a configured pair of materials.
+/// The pass for a configured pair of materials, in a run with or without ellipsoids.
 #[must_use]
-pub fn build(pair: &PairConfig) -> Box<dyn PairPass> {
-    composition::visit(pair, Builder)
+pub fn build(pair: &PairConfig, ellipsoids: bool) -> Box<dyn PairPass> {
+    composition::visit(pair, Builder { ellipsoids })
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
@@ -117,10 +142,17 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     }
 
     fn columns(&self) -> Vec<Column> {
-        self.law.columns()
+        let mut columns = self.law.columns();
+        if self.ellipsoids {
+            columns.extend(ellipsoids::normal_columns());
+        }
+        columns
     }
 
     fn stride(&self) -> usize {
+        if self.ellipsoids {
+            return ellipsoids::WIDTH;
+        }
         match (C::TANGENTIAL, C::ROLLING) {
             (_, true) => 12,
             (true, false) => 8,
@@ -151,6 +183,9 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     }
 
     fn run(&self, job: Job) -> Excess {
+        if self.ellipsoids {
+            return self.run_ellipsoids(job);
+        }
         if job.section.partners == Partners::Wall {
             return self.walls(job);
         }
@@ -175,11 +210,16 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
     ) {
+        if self.ellipsoids {
+            self.observe_ellipsoids(input, bodies, section, blocks, observed);
+            return;
+        }
+        let records = bodies.records;
         if !observed.single() && section.partners != Partners::Wall {
             let [stiffness, ratio] = match input.simd {
                 // SAFETY: as in `run`.
@@ -208,7 +248,8 @@ impl<C: ContactLaw> LawPass<C> {
         if !C::LASTS {
             return pair.touching;
         }
-        let reach = L::splat(-self.law.range()) * pair.touch.effective_radius;
+        // The effective radius of flat ellipsoids has no bound; that of spheres is below the smaller radius.
+        let reach = L::splat(-self.law.range()) * pair.touch.effective_radius.min(pair.min_radius);
         pair.touching | pair.touch.overlap.greater(reach)
     }
 
@@ -226,7 +267,8 @@ impl<C: ContactLaw> LawPass<C> {
 
     #[inline(always)]
     fn spheres<L: Lane, const LEDGER: bool>(&self, job: Job) -> Excess {
-        let Job { input, records, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines } = job;
+        let records = bodies.records;
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
         let (start, end) = (blocks.start * BLOCK, blocks.end * BLOCK);
@@ -248,7 +290,8 @@ impl<C: ContactLaw> LawPass<C> {
     }
 
     fn walls(&self, job: Job) -> Excess {
-        let Job { input, records, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines } = job;
+        let records = bodies.records;
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
@@ -390,7 +433,8 @@ impl<C: ContactLaw> LawPass<C> {
             observed.no_touch();
             return;
         }
-        observed.touch(section.origin + first[0] as usize, &pair, &response, wall);
+        let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
+        observed.touch(section.origin + first[0] as usize, &pair, &response, virials, wall);
     }
 }
 

@@ -7,6 +7,7 @@
 
 pub mod curvature;
 pub mod normal;
+pub mod touch;
 
 use super::lane::{Lane, Vector, dot};
 
