@@ -153,7 +153,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         })
         .collect();
     let extremes = extremes(comm, &species, &initial.particles);
-    let passes: Vec<_> = config.pairs.iter().map(pass::build).collect();
+    let passes: Vec<_> = config.pairs.iter().map(|pair| pass::build(pair, extremes.ellipsoids)).collect();
     let fraction = match config.time_step {
         TimeStepConfig::Automatic { reference_overlap, .. } => reference_overlap,
         TimeStepConfig::Fixed(_) => 1e-3,

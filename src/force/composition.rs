@@ -56,6 +56,11 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     };
     const TANGENTIAL: bool = T::MEMORY > 0;
     const ROLLING: bool = R::MEMORY > 0;
+    const LASTS: bool = N::LASTS;
+
+    fn range(&self) -> f64 {
+        self.normal.range()
+    }
 
     fn columns(&self) -> Vec<Column> {
         [self.normal.columns(), self.tangential.columns(), self.rolling.columns()].concat()
@@ -72,9 +77,20 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
         let (normal_memory, rest) = memory.split_at_mut(N::MEMORY);
         let (tangential_memory, rolling_memory) = rest.split_at_mut(T::MEMORY);
         let normal = self.normal.evaluate(touch, normal_memory);
-        let tangential = self.tangential.evaluate(touch, &normal, tangential_memory);
-        let rolling = self.rolling.evaluate(touch, &normal, rolling_memory);
+        let mut tangential = self.tangential.evaluate(touch, &normal, tangential_memory);
+        let mut rolling = self.rolling.evaluate(touch, &normal, rolling_memory);
+        // Written so that NaN counts as joined and is found.
+        let joined = !L::splat(0.0).at_least(normal.contact_radius);
+        if N::LASTS {
+            // Friction ends with the contact circle, though the normal law's memory goes on.
+            tangential = tangential.only(joined);
+            rolling = rolling.only(joined);
+            for value in tangential_memory.iter_mut().chain(rolling_memory) {
+                *value = L::select(joined, *value, L::splat(0.0));
+            }
+        }
         ContactResponse {
+            joined,
             normal_force: normal.force,
             tangential_force: tangential.value,
             moment: rolling.value,

@@ -75,7 +75,7 @@ pub struct PairTouch<L: Lane> {
 }
 
 #[inline(always)]
-fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
+pub(super) fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
     [L::look_up(&table.axes[0], codes, 0), L::look_up(&table.axes[1], codes, 3), L::look_up(&table.axes[2], codes, 6)]
 }
 
@@ -111,6 +111,9 @@ pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &Ce
         overlap,
         overlap_rate: -approach,
         effective_radius: a.radius * b.radius * per_sum,
+        radius_factor: L::splat(1.0),
+        overlap_factor: L::splat(1.0),
+        size: sum,
         effective_mass: both * sum,
         normal,
         slip_velocity: sub(sub(velocity, scale(normal, approach)), turning),
@@ -142,6 +145,9 @@ pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> PairTouch<f64> {
         overlap,
         overlap_rate: -approach,
         effective_radius: a.radius,
+        radius_factor: 1.0,
+        overlap_factor: 1.0,
+        size: 2.0 * a.radius,
         effective_mass: 1.0 / a.inverse_mass,
         normal: unit,
         slip_velocity: sub(sub(velocity, scale(unit, approach)), turning),

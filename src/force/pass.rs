@@ -12,7 +12,10 @@ use super::simd::Simd;
 use crate::config::PairConfig;
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
+use crate::state::shape::Shape;
 use std::ops::Range;
+
+mod ellipsoids;
 
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
@@ -25,7 +28,8 @@ const PREFETCH: usize = 6;
 pub struct PassInput<'a> {
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), then the ledger's.
+    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), 16 (two torques, between
+    /// ellipsoids), then the ledger's.
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
@@ -40,8 +44,8 @@ pub struct PassInput<'a> {
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; then
-    /// the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
+    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
+    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
     /// Number of the first block's first line.
     pub first: usize,
@@ -49,13 +53,30 @@ pub struct LineRing<'a> {
     pub mask: usize,
 }
 
+/// Owned particles and ghosts as a pass reads them, from a section's origin on.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyData<'a> {
+    /// Records.
+    pub records: &'a [Record],
+    /// Semi-axes and orientations; empty when every particle of all ranks is a sphere.
+    pub shapes: &'a [Shape],
+}
+
+impl BodyData<'_> {
+    /// From this place on.
+    #[must_use]
+    pub fn from(&self, origin: usize) -> Self {
+        Self { records: &self.records[origin..], shapes: &self.shapes[origin.min(self.shapes.len())..] }
+    }
+}
+
 /// Some blocks of a section to evaluate.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// What all passes share.
     pub input: &'a PassInput<'a>,
-    /// Records of owned particles and ghosts from the section's origin on.
-    pub records: &'a [Record],
+    /// Owned particles and ghosts from the section's origin on.
+    pub bodies: BodyData<'a>,
     /// The section; its memory moves on by one step.
     pub section: &'a mut Section,
     /// Numbers of the blocks.
@@ -77,13 +98,15 @@ pub trait PairPass: Send + Sync {
     fn stride(&self) -> usize;
     /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
     fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
+    /// Gap over the effective radius up to which contacts keep their memory; 0 if it ends with the touch.
+    fn range(&self) -> f64;
     /// Evaluate some blocks of a section.
     fn run(&self, job: Job) -> Excess;
     /// Look at some blocks of a section without changing anything.
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
@@ -92,21 +115,25 @@ pub trait PairPass: Send + Sync {
 
 struct LawPass<C> {
     law: C,
+    /// There are ellipsoids.
+    ellipsoids: bool,
 }
 
-struct Builder;
+struct Builder {
+    ellipsoids: bool,
+}
 
 impl LawVisitor for Builder {
     type Output = Box<dyn PairPass>;
     fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        Box::new(LawPass { law })
+        Box::new(LawPass { law, ellipsoids: self.ellipsoids })
     }
 }
 
-/// The pass for a configured pair of materials.
+/// The pass for a configured pair of materials, in a run with or without ellipsoids.
 #[must_use]
-pub fn build(pair: &PairConfig) -> Box<dyn PairPass> {
-    composition::visit(pair, Builder)
+pub fn build(pair: &PairConfig, ellipsoids: bool) -> Box<dyn PairPass> {
+    composition::visit(pair, Builder { ellipsoids })
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
@@ -115,10 +142,17 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     }
 
     fn columns(&self) -> Vec<Column> {
-        self.law.columns()
+        let mut columns = self.law.columns();
+        if self.ellipsoids {
+            columns.extend(ellipsoids::normal_columns());
+        }
+        columns
     }
 
     fn stride(&self) -> usize {
+        if self.ellipsoids {
+            return ellipsoids::WIDTH;
+        }
         match (C::TANGENTIAL, C::ROLLING) {
             (_, true) => 12,
             (true, false) => 8,
@@ -131,6 +165,9 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             overlap,
             overlap_rate: 0.0,
             effective_radius,
+            radius_factor: 1.0,
+            overlap_factor: 1.0,
+            size: 4.0 * effective_radius,
             effective_mass: 1.0,
             normal: [0.0, 0.0, 1.0],
             slip_velocity: [0.0; 3],
@@ -141,7 +178,14 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
     }
 
+    fn range(&self) -> f64 {
+        if C::LASTS { self.law.range() } else { 0.0 }
+    }
+
     fn run(&self, job: Job) -> Excess {
+        if self.ellipsoids {
+            return self.run_ellipsoids(job);
+        }
         if job.section.partners == Partners::Wall {
             return self.walls(job);
         }
@@ -166,11 +210,16 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
     ) {
+        if self.ellipsoids {
+            self.observe_ellipsoids(input, bodies, section, blocks, observed);
+            return;
+        }
+        let records = bodies.records;
         if !observed.single() && section.partners != Partners::Wall {
             let [stiffness, ratio] = match input.simd {
                 // SAFETY: as in `run`.
@@ -193,6 +242,17 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 }
 
 impl<C: ContactLaw> LawPass<C> {
+    /// Lanes whose law is asked: those that touch, and those near enough for a memory that lasts.
+    #[inline(always)]
+    fn alive<L: Lane>(&self, pair: &PairTouch<L>) -> L::Mask {
+        if !C::LASTS {
+            return pair.touching;
+        }
+        // The effective radius of flat ellipsoids has no bound; that of spheres is below the smaller radius.
+        let reach = L::splat(-self.law.range()) * pair.touch.effective_radius.min(pair.min_radius);
+        pair.touching | pair.touch.overlap.greater(reach)
+    }
+
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn spheres_avx2<const LEDGER: bool>(&self, job: Job) -> Excess {
@@ -207,7 +267,8 @@ impl<C: ContactLaw> LawPass<C> {
 
     #[inline(always)]
     fn spheres<L: Lane, const LEDGER: bool>(&self, job: Job) -> Excess {
-        let Job { input, records, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines } = job;
+        let records = bodies.records;
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
         let (start, end) = (blocks.start * BLOCK, blocks.end * BLOCK);
@@ -229,7 +290,8 @@ impl<C: ContactLaw> LawPass<C> {
     }
 
     fn walls(&self, job: Job) -> Excess {
-        let Job { input, records, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines } = job;
+        let records = bodies.records;
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
@@ -260,7 +322,8 @@ impl<C: ContactLaw> LawPass<C> {
         wall: bool,
     ) {
         let zero = L::splat(0.0);
-        if !L::any(pair.touching) {
+        let alive = self.alive(pair);
+        if !L::any(alive) {
             rows.fill(0.0);
             for column in memory {
                 zero.store(&mut column.0[lane..]);
@@ -273,7 +336,7 @@ impl<C: ContactLaw> LawPass<C> {
             values[column] = L::load(&memory[column].0[lane..]);
         }
         let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-        let kept = |value: L| L::select(pair.touching, value, zero);
+        let kept = |value: L| L::select(alive, value, zero);
         for column in 0..C::MEMORY {
             kept(values[column]).store(&mut memory[column].0[lane..]);
         }
@@ -333,7 +396,7 @@ impl<C: ContactLaw> LawPass<C> {
                 values[column] = L::load(&memory[column].0[place % BLOCK..]);
             }
             let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-            stiffness = L::select(pair.touching, response.stiffness, zero).max(stiffness);
+            stiffness = L::select(self.alive(&pair), response.stiffness, zero).max(stiffness);
             ratio = L::select(pair.touching, pair.touch.overlap / pair.min_radius, zero).max(ratio);
         }
         let mut lanes = [0.0; 2 * BLOCK];
@@ -359,14 +422,19 @@ impl<C: ContactLaw> LawPass<C> {
             let (a, b) = (Bodies::gather(records, first), Bodies::gather(records, &section.second[place..=place]));
             geometry::spheres(&a, &b, &section.shift[place..=place], input.motion)
         };
-        if !pair.touching {
+        if !self.alive(&pair) {
             observed.no_touch();
             return;
         }
         let mut memory = [0.0; MAX_MEMORY];
         section.read_memory(place, &mut memory);
         let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
-        observed.touch(section.origin + first[0] as usize, &pair, &response, wall);
+        if C::LASTS && !response.joined {
+            observed.no_touch();
+            return;
+        }
+        let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
+        observed.touch(section.origin + first[0] as usize, &pair, &response, virials, wall);
     }
 }
 

@@ -17,7 +17,7 @@ pub struct Load<L> {
 /// Output lines of the contact passes as the particles of one strip see them.
 #[derive(Debug, Clone, Copy)]
 pub struct Lines<'a> {
-    /// Numbers per line that hold forces, torques and moments: 4, 8 or 12.
+    /// Numbers per line that hold forces, torques and moments: 4, 8, 12, or 16 between ellipsoids.
     pub width: usize,
     /// Numbers per line, with the ledger's.
     pub stride: usize,
@@ -49,7 +49,8 @@ impl Lines<'_> {
         match self.width {
             4 => self.sum::<L, 4>(ends),
             8 => self.sum::<L, 8>(ends),
-            _ => self.sum::<L, 12>(ends),
+            12 => self.sum::<L, 12>(ends),
+            _ => self.sum::<L, 16>(ends),
         }
     }
 
@@ -61,6 +62,10 @@ impl Lines<'_> {
             let line = self.part::<WIDTH>(end.line(), 0);
             let sign = L::splat(SIGN[usize::from(end.is_second())]);
             force = force + sign * L::load(&line[..4]);
+            if WIDTH == 16 {
+                torque = torque + L::load(&line[4 + 4 * usize::from(end.is_second())..][..4]);
+                continue;
+            }
             if WIDTH >= 8 {
                 let arm = line[3 + 4 * usize::from(end.is_second())];
                 torque = torque + L::splat(arm) * L::load(&line[4..8]);

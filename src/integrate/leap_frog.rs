@@ -79,7 +79,8 @@ pub struct Slice<'a> {
     velocity: &'a mut [[f64; 4]],
     spin: &'a mut [[f64; 4]],
     orientation: &'a mut [[f64; 4]],
-    shape: &'a mut [Shape],
+    /// Their shapes; empty when every particle of all ranks is a sphere.
+    pub shape: &'a mut [Shape],
     ledger: &'a mut [[f64; LEDGER.len()]],
     reference: &'a [[f64; 4]],
     crossed: &'a mut [[i8; 4]],

@@ -22,7 +22,7 @@ use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, agree}
 use crate::force::geometry::CellMotion;
 use crate::force::law::Column;
 use crate::force::observe::{Observation, Wanted};
-use crate::force::pass::{LEDGER_STRIDE, PairPass, PassInput};
+use crate::force::pass::{BodyData, LEDGER_STRIDE, PairPass, PassInput};
 use crate::force::simd::Simd;
 use crate::integrate::leap_frog::{Reference, Slice, StepMotion, StepResult};
 use crate::integrate::time_step::TimeStepControl;
@@ -357,7 +357,7 @@ impl Simulation {
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
         let particles = &self.particles;
-        let observation = phase.observe(&self.contacts, &particles.record, particles.owned, wanted, &mut self.forces);
+        let observation = phase.observe(&self.contacts, bodies(particles), particles.owned, wanted, &mut self.forces);
         self.timers.stop();
         observation
     }
@@ -378,7 +378,7 @@ impl Simulation {
                           reference: &mut Reference,
                           timers: &mut Timers| {
             timers.start(Stage::Contacts);
-            let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], &particles.record, lines);
+            let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], bodies(particles), lines);
             timers.start(Stage::Step);
             let (slice, _) = Slice::new(particles, reference).split(moving);
             let (result, near_fault) = phase.near(contacts, 0..inner, slice, lines, &motion);
@@ -399,7 +399,7 @@ impl Simulation {
                 take_ghost_wraps(ghost_wraps, contacts, reference);
             }
             timers.start(Stage::Contacts);
-            let ghost_fault = phase.kept(contacts, &[Partners::Ghost], &particles.record, lines);
+            let ghost_fault = phase.kept(contacts, &[Partners::Ghost], bodies(particles), lines);
             timers.start(Stage::Step);
             let (_, slice) = Slice::new(particles, reference).split(moving);
             let (border, near_fault) = phase.near(contacts, inner..strips, slice, lines, &motion);
@@ -466,6 +466,10 @@ impl Simulation {
     fn periodic(&self) -> [bool; 3] {
         self.model.lists.walls.map(|wall| wall.is_none())
     }
+}
+
+fn bodies(particles: &Particles) -> BodyData<'_> {
+    BodyData { records: &particles.record, shapes: &particles.shape }
 }
 
 /// Adjust contacts and counters of ghosts that crossed a periodic face.

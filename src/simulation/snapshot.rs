@@ -12,7 +12,7 @@ impl Simulation {
     pub fn snapshot_particles(&self, samples: &[Sample]) -> Vec<SnapshotParticle> {
         let mut virials = vec![[0.0; 2]; self.contacts.lines];
         for sample in samples {
-            virials[sample.line] = sample.arms.map(|arm| arm * sample.normal_force);
+            virials[sample.line] = sample.virials;
         }
         (0..self.particles.owned)
             .map(|index| {

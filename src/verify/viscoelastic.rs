@@ -20,7 +20,7 @@ const RADIUS: f64 = 5e-6;
 const SHARE: f64 = 1e-3;
 
 /// Rows of numbers below the header.
-fn rows(csv: &str) -> Result<Vec<Vec<f64>>> {
+pub fn rows(csv: &str) -> Result<Vec<Vec<f64>>> {
     let row = |line: &str| {
         line.split(',').map(|field| field.trim().parse::<f64>()).collect::<std::result::Result<Vec<_>, _>>()
     };
