@@ -7,6 +7,7 @@ mod oblique;
 mod scene;
 mod sliding;
 mod viscoelastic;
+pub mod wahn2022;
 
 use crate::error::Result;
 use std::time::Instant;
