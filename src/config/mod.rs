@@ -12,6 +12,7 @@ mod programme;
 mod radius;
 mod reference;
 mod resolved;
+mod routine;
 pub mod schema;
 mod section;
 mod settings;
@@ -22,6 +23,7 @@ mod values;
 
 pub use build::load;
 pub use reference::{example, reference_markdown};
+pub use routine::{Damping, QuasiStaticConfig, Routine};
 pub use shape::ShapeConfig;
 
 use crate::force::registry::{LawChoice, PairProperties};
@@ -48,6 +50,8 @@ pub struct Config {
     pub gravity: [f64; 3],
     /// BCT or BC (PHYSICS.md section 5).
     pub kinematics: Kinematics,
+    /// How quasi-static stages find their equilibria.
+    pub quasi_static: QuasiStaticConfig,
     /// What follows what; at least one stage.
     pub stages: Vec<Stage>,
     /// The time step.
@@ -303,7 +307,9 @@ pub enum AxisControl {
 pub struct Stage {
     /// Name shown in the log.
     pub name: String,
-    /// Control per axis.
+    /// Dynamic or quasi-static.
+    pub routine: Routine,
+    /// Control per axis. In a quasi-static stage strain rates count per increment.
     pub axes: [AxisControl; 3],
     /// Ends after this time \[s\] since its start.
     pub duration: Option<f64>,
@@ -313,6 +319,8 @@ pub struct Stage {
     pub until_stress: Option<(usize, f64)>,
     /// Number of steps; mostly for tests and benches.
     pub steps: Option<u64>,
+    /// Number of increments of a quasi-static stage.
+    pub increments: Option<u64>,
 }
 
 /// The time step.
@@ -364,6 +372,8 @@ pub enum Interval {
     Steps(u64),
     /// At the first step at or after each multiple of this time \[s\].
     Time(f64),
+    /// Every so many equilibria of quasi-static stages.
+    Increments(u64),
 }
 
 /// Ranks, threads, lists.
