@@ -18,7 +18,7 @@ type Points = Vec<(f64, f64)>;
 /// How far forces may be off.
 const SHARE: f64 = 1e-3;
 /// Steps between looks.
-const INTERVAL: u64 = 50;
+const INTERVAL: u64 = 10;
 
 /// The elastic–fully plastic theory: the pressure stays at that of first yield.
 const WITHOUT_TRANSITION: [&str; 2] =
