@@ -80,7 +80,7 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
         let grid = Decomposition::automatic(ranks, particles as u64, 1, [side; 3]).grid;
         let geometry =
             HaloGeometry { grid, sides: [side; 3], periodic: [true; 3], margin: 2.0 + 2.0 * skin, particles };
-        let traffic = geometry.expected(HaloContent { velocities: true }.bytes() as f64);
+        let traffic = geometry.expected(HaloContent { velocities: true, orientations: false }.bytes() as f64);
         let time = StepTime::new(&geometry, &traffic, &machine, 1.0);
         println!(
             "{:>8} {:>14} {:>12.4e} {:>9.0} {:>8.1} {:>9.1} {:>10.4} {:>10.4} {:>10.4} {:>10.4} {:>8.1} {:>8.1}",

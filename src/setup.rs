@@ -15,7 +15,8 @@ use crate::load::LoadProgramme;
 use crate::output::checkpoint::Checkpoint;
 use crate::packing::{self, Packing, Worst};
 use crate::simulation::{Model, Simulation};
-use crate::state::particles::{SpeciesConstants, sphere_mass};
+use crate::state::particles::SpeciesConstants;
+use crate::state::shape::{ellipsoid_mass, is_sphere};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
 use std::ops::Range;
 use std::sync::Arc;
@@ -38,6 +39,7 @@ struct Extremes {
     min_mass: f64,
     max_mass: f64,
     max_spin: f64,
+    ellipsoids: bool,
     solid_volume: f64,
 }
 
@@ -83,6 +85,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         snapshots: 0,
         measured_stress: [0.0; 3],
         particles: count,
+        quasi_static: None,
     };
     programme(config).enter(&mut global);
     Ok(Initial { global, particles, memory: ContactMemory::new(0) })
@@ -151,7 +154,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         })
         .collect();
     let extremes = extremes(comm, &species, &initial.particles);
-    let passes: Vec<_> = config.pairs.iter().map(pass::build).collect();
+    let passes: Vec<_> = config.pairs.iter().map(|pair| pass::build(pair, extremes.ellipsoids)).collect();
     let fraction = match config.time_step {
         TimeStepConfig::Automatic { reference_overlap, .. } => reference_overlap,
         TimeStepConfig::Fixed(_) => 1e-3,
@@ -177,7 +180,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         total: initial.global.particles as u32,
         skin: 0.0,
     };
-    let turns = passes.iter().any(|pass| pass.stride() > 4) || extremes.max_spin > 0.0;
+    let turns = passes.iter().any(|pass| pass.stride() > 4) || extremes.max_spin > 0.0 || extremes.ellipsoids;
     let model = Model {
         config: Arc::clone(config),
         species,
@@ -187,6 +190,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         lists,
         max_radius: extremes.max_radius,
         solid_volume: extremes.solid_volume,
+        ellipsoids: extremes.ellipsoids,
         rotation: turns,
         simd: agree(comm, Simd::choose(config.parallel.simd))?,
     };
@@ -219,7 +223,7 @@ fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
 
 fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[ParticleState]) -> Extremes {
     let mut low = [f64::INFINITY];
-    let mut high = [0.0_f64; 3];
+    let mut high = [0.0_f64; 4];
     let mut volume = [ExactSum::new()];
     let raise = |place: &mut f64, value: f64| {
         if value > *place {
@@ -228,11 +232,14 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
     };
     for particle in particles {
         let constants = species[particle.species as usize];
-        let mass = sphere_mass(particle.radius, constants.density);
-        volume[0].add(sphere_mass(particle.radius, 1.0));
+        let mass = ellipsoid_mass(particle.semi_axes, constants.density);
+        volume[0].add(ellipsoid_mass(particle.semi_axes, 1.0));
         raise(&mut high[0], particle.radius);
         for spin in particle.spin {
             raise(&mut high[2], spin.abs());
+        }
+        if !is_sphere(particle.semi_axes) {
+            high[3] = 1.0;
         }
         if !constants.driven {
             raise(&mut high[1], mass);
@@ -249,6 +256,7 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
         min_mass: low[0],
         max_mass: high[1],
         max_spin: high[2],
+        ellipsoids: high[3] > 0.0,
         solid_volume: volume[0].value(),
     }
 }

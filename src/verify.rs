@@ -1,12 +1,16 @@
 //! `dem-mpi verify`: runs cases with a known answer through the whole program in this process and
 //! compares. Knows the simulation from outside only, as a user's script would.
 
+pub mod becker2021;
 mod collision;
 mod conservation;
+mod ellipsoids;
 mod oblique;
+mod plastic;
 mod scene;
 mod sliding;
 mod viscoelastic;
+pub mod wahn2022;
 
 use crate::error::Result;
 use std::time::Instant;
@@ -97,6 +101,11 @@ const CASES: &[Case] = &[
     Case { name: "oblique impact of two spheres (Chung & Ooi 2011, test 5)", run: oblique::spheres },
     Case { name: "Maxwell-Zener strain rates (W Fig. 9)", run: viscoelastic::rates },
     Case { name: "Maxwell-Zener relaxation (W Fig. 10)", run: viscoelastic::relaxation },
+    Case { name: "Thornton force along a path of overlaps", run: plastic::path },
+    Case { name: "Thornton restitution (Thornton 1997)", run: plastic::restitution },
+    Case { name: "Becker-Kamlah force along a path of overlaps (B Table 3)", run: ellipsoids::path },
+    Case { name: "off-centre impact of two ellipsoids", run: ellipsoids::conservation },
+    Case { name: "spheres treated as ellipsoids", run: ellipsoids::spheres },
     Case { name: "sliding block and rolling sphere", run: sliding::to_rest },
     Case { name: "momentum and energy of a periodic gas", run: conservation::gas },
     Case { name: "order of the integrator", run: conservation::order },

@@ -8,6 +8,7 @@ use super::halo_map::HaloMap;
 use super::{Communicator, Decomposition, agree};
 use crate::error::{Error, Result};
 use crate::state::particles::{Particles, Record};
+use crate::state::shape::Shape;
 use bytemuck::{Pod, Zeroable};
 
 /// What an update carries beside positions and image counters.
@@ -15,11 +16,18 @@ use bytemuck::{Pod, Zeroable};
 pub struct HaloContent {
     /// Full-step velocities and spins, for laws that damp or rub.
     pub velocities: bool,
+    /// Orientations, for contacts of ellipsoids.
+    pub orientations: bool,
 }
 
 impl HaloContent {
-    /// 64-bit words per particle: position, image counters and, if asked, velocity and spin.
+    /// 64-bit words per particle: position, image counters and, if asked, velocity and spin, orientation.
     fn words(self) -> usize {
+        self.orientation_at() + if self.orientations { 4 } else { 0 }
+    }
+
+    /// Where in an entry the orientation is.
+    fn orientation_at(self) -> usize {
         if self.velocities { 11 } else { 5 }
     }
 
@@ -171,13 +179,24 @@ impl HaloPlan {
             particles.record.push(ghost.record);
             particles.image.push(ghost.image);
         }
+        if particles.ellipsoids {
+            self.bring_shapes(comm, particles);
+        }
+    }
+
+    /// Semi-axes and orientations of the ghosts.
+    fn bring_shapes(&mut self, comm: &Communicator, particles: &mut Particles) {
+        let leaving: Vec<Shape> = self.send_index.iter().map(|&index| particles.shape[index as usize]).collect();
+        let mut arriving = vec![Shape::zeroed(); self.ghosts];
+        comm.exchange_each(outgoing(&self.sends, &leaving, 1), incoming(&self.receives, &mut arriving, 1), || ());
+        particles.shape.extend(arriving);
     }
 
     /// Refresh the ghosts; `meanwhile` runs on the particles while the messages fly (it sees the ghosts as
     /// they were; what is sent was taken before it). All ranks call it, with the same content.
     ///
-    /// Position and image counters always come, full-step velocity and spin if asked; what is not asked
-    /// keeps its old value. `wrapped` is replaced by the ghosts that crossed a periodic face since the last
+    /// Position and image counters always come, full-step velocity and spin and the orientation if asked;
+    /// what is not asked keeps its old value. Orientations may be asked only if there are ellipsoids. `wrapped` is replaced by the ghosts that crossed a periodic face since the last
     /// update: local index and the change of the image counters.
     pub fn update<R>(
         &mut self,
@@ -191,7 +210,12 @@ impl HaloPlan {
         self.outgoing.resize(self.send_index.len() * words, 0);
         self.incoming.resize(self.ghosts * words, 0);
         for (&index, entry) in self.send_index.iter().zip(self.outgoing.chunks_exact_mut(words)) {
-            pack(&particles.record[index as usize], particles.image[index as usize], entry);
+            let index = index as usize;
+            pack(&particles.record[index], particles.image[index], content.velocities, entry);
+            if content.orientations {
+                let orientation = particles.shape[index].orientation.map(f64::to_bits);
+                entry[content.orientation_at()..].copy_from_slice(&orientation);
+            }
         }
         let result = comm.exchange_each(
             outgoing(&self.sends, &self.outgoing, words),
@@ -200,7 +224,11 @@ impl HaloPlan {
         );
         wrapped.clear();
         for (ghost, entry) in (self.owned..).zip(self.incoming.chunks_exact(words)) {
-            let image = unpack(entry, &mut particles.record[ghost]);
+            let image = unpack(entry, &mut particles.record[ghost], content.velocities);
+            if content.orientations {
+                let at = content.orientation_at();
+                particles.shape[ghost].orientation = [0, 1, 2, 3].map(|k| f64::from_bits(entry[at + k]));
+            }
             let old = std::mem::replace(&mut particles.image[ghost], image);
             if image != old {
                 wrapped.push((ghost as u32, [0, 1, 2].map(|k| image[k] - old[k])));
@@ -299,22 +327,22 @@ fn incoming<'a, T: Pod>(
     })
 }
 
-/// One entry of an update; its length tells whether velocities travel.
-fn pack(record: &Record, image: [i32; 3], entry: &mut [u64]) {
+/// One entry of an update but for the orientation.
+fn pack(record: &Record, image: [i32; 3], velocities: bool, entry: &mut [u64]) {
     entry[..3].copy_from_slice(&record.position.map(f64::to_bits));
     entry[3] = u64::from(image[0] as u32) << 32 | u64::from(image[1] as u32);
     entry[4] = u64::from(image[2] as u32);
-    if entry.len() > 5 {
+    if velocities {
         entry[5..8].copy_from_slice(&record.velocity.map(f64::to_bits));
-        entry[8..].copy_from_slice(&record.spin.map(f64::to_bits));
+        entry[8..11].copy_from_slice(&record.spin.map(f64::to_bits));
     }
 }
 
 /// The reverse of [`pack`]; returns the image counters.
-fn unpack(entry: &[u64], record: &mut Record) -> [i32; 3] {
+fn unpack(entry: &[u64], record: &mut Record, velocities: bool) -> [i32; 3] {
     let vector = |start: usize| [0, 1, 2].map(|k| f64::from_bits(entry[start + k]));
     record.position = vector(0);
-    if entry.len() > 5 {
+    if velocities {
         record.velocity = vector(5);
         record.spin = vector(8);
     }
@@ -334,10 +362,10 @@ mod tests {
             ..Record::zeroed()
         };
         for velocities in [false, true] {
-            let mut entry = vec![0; HaloContent { velocities }.words()];
-            pack(&record, [-1, 2, i32::MIN], &mut entry);
+            let mut entry = vec![0; HaloContent { velocities, orientations: false }.words()];
+            pack(&record, [-1, 2, i32::MIN], velocities, &mut entry);
             let mut copy = Record::zeroed();
-            assert_eq!(unpack(&entry, &mut copy), [-1, 2, i32::MIN]);
+            assert_eq!(unpack(&entry, &mut copy, velocities), [-1, 2, i32::MIN]);
             assert_eq!(copy.position.map(f64::to_bits), record.position.map(f64::to_bits));
             assert_eq!(copy.velocity == record.velocity && copy.spin == record.spin, velocities);
         }
@@ -356,7 +384,7 @@ mod tests {
         assert_eq!((plan.ghosts(), plan.messages(), plan.inner()), (0, 0, [0].as_slice()));
         assert!(!plan.is_border(0));
         let mut wrapped = vec![(1, [0; 3])];
-        let content = HaloContent { velocities: true };
+        let content = HaloContent { velocities: true, orientations: false };
         assert_eq!(plan.update(&comm, &mut particles, content, &mut wrapped, |p| p.len()), 1);
         assert!(wrapped.is_empty());
     }

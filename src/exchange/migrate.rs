@@ -131,10 +131,12 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
         });
     }
     // Naming every field makes the compiler ask here for a field added later.
-    let Particles { owned, id, species, record, image, velocity, spin, orientation, ledger } = particles;
+    let Particles { owned, id, species, record, ellipsoids: _, shape, image, velocity, spin, orientation, ledger } =
+        particles;
     sift(id, &keep);
     sift(species, &keep);
     sift(record, &keep);
+    sift(shape, &keep);
     sift(image, &keep);
     sift(velocity, &keep);
     sift(spin, &keep);
@@ -145,11 +147,13 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
 
 /// Append the owned particles of `more`. There are no ghosts.
 fn append(particles: &mut Particles, more: Particles) {
-    let Particles { owned, id, species, record, image, velocity, spin, orientation, ledger } = more;
+    let Particles { owned, id, species, record, ellipsoids: _, shape, image, velocity, spin, orientation, ledger } =
+        more;
     particles.owned += owned;
     particles.id.extend(id);
     particles.species.extend(species);
     particles.record.extend(record);
+    particles.shape.extend(shape);
     particles.image.extend(image);
     particles.velocity.extend(velocity);
     particles.spin.extend(spin);

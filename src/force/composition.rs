@@ -57,6 +57,11 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     const NORMAL_MEMORY: usize = N::MEMORY;
     const TANGENTIAL: bool = T::MEMORY > 0;
     const ROLLING: bool = R::MEMORY > 0;
+    const LASTS: bool = N::LASTS;
+
+    fn range(&self) -> f64 {
+        self.normal.range()
+    }
 
     fn columns(&self) -> Vec<Column> {
         [self.normal.columns(), self.tangential.columns(), self.rolling.columns()].concat()
@@ -68,6 +73,11 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
         self.rolling.prepare(time_step);
     }
 
+    fn relax(&mut self) {
+        self.normal.relax();
+        self.tangential.relax();
+    }
+
     #[inline(always)]
     fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
         self.normal.evaluate(touch, memory)
@@ -76,9 +86,20 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     #[inline(always)]
     fn complete<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> ContactResponse<L> {
         let (tangential_memory, rolling_memory) = memory.split_at_mut(T::MEMORY);
-        let tangential = self.tangential.evaluate(touch, normal, tangential_memory);
-        let rolling = self.rolling.evaluate(touch, normal, rolling_memory);
+        let mut tangential = self.tangential.evaluate(touch, normal, tangential_memory);
+        let mut rolling = self.rolling.evaluate(touch, normal, rolling_memory);
+        // Written so that NaN counts as joined and is found.
+        let joined = !L::splat(0.0).at_least(normal.contact_radius);
+        if N::LASTS {
+            // Friction ends with the contact circle, though the normal law's memory goes on.
+            tangential = tangential.only(joined);
+            rolling = rolling.only(joined);
+            for value in tangential_memory.iter_mut().chain(rolling_memory) {
+                *value = L::select(joined, *value, L::splat(0.0));
+            }
+        }
         ContactResponse {
+            joined,
             normal_force: normal.force,
             tangential_force: tangential.value,
             moment: rolling.value,

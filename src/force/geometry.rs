@@ -76,8 +76,10 @@ pub struct PairTouch<L: Lane> {
     pub min_radius: L,
 }
 
+/// `S·factor` of some packed shifts.
 #[inline(always)]
-fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
+#[must_use]
+pub fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
     [L::look_up(&table.axes[0], codes, 0), L::look_up(&table.axes[1], codes, 3), L::look_up(&table.axes[2], codes, 6)]
 }
 
@@ -100,6 +102,21 @@ pub struct Relative<L> {
     pub radii: [L; 2],
     /// 1/m_i + 1/m_j \[1/kg\].
     pub inverse_masses: L,
+}
+
+impl<L: Lane> PairTouch<L> {
+    /// Lanes whose law is asked: those that touch, and those near enough for a memory that lasts; `range` is the
+    /// law's, 0 for a memory that ends with the touch.
+    #[inline(always)]
+    #[must_use]
+    pub fn alive(&self, range: f64) -> L::Mask {
+        if range == 0.0 {
+            return self.touching;
+        }
+        // The effective radius of flat ellipsoids has no bound; that of spheres is below the smaller radius.
+        let reach = L::splat(-range) * self.touch.effective_radius.min(self.min_radius);
+        self.touching | self.touch.overlap.greater(reach)
+    }
 }
 
 /// Spheres a and b, b in the image of its packed shift.
@@ -153,6 +170,9 @@ pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
         overlap,
         overlap_rate: -approach,
         effective_radius: first * second * (both * pair.inverse_masses),
+        radius_factor: L::splat(1.0),
+        overlap_factor: L::splat(1.0),
+        size: sum,
         effective_mass: both * sum,
         normal,
         slip_velocity: sub(sub(pair.velocity, scale(normal, approach)), turning),
@@ -198,6 +218,9 @@ pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> PairTouch<f64> {
         overlap,
         overlap_rate: -approach,
         effective_radius: a.radius,
+        radius_factor: 1.0,
+        overlap_factor: 1.0,
+        size: 2.0 * a.radius,
         effective_mass: 1.0 / a.inverse_mass,
         normal: unit,
         slip_velocity: sub(sub(velocity, scale(unit, approach)), turning),

@@ -25,11 +25,14 @@ pub const ENTRY: LawEntry = LawEntry {
 /// which raises the restitution (tsuji: 0.5 in gives 0.550 out); the default damping is `tsuji`, for
 /// which restitution comes out as put in when clipping is off. No memory.
 ///
+/// Between ellipsoids `F = 4/3 E_eff √R_e (δ/f_2)^{3/2}` with the equivalent contact radius `f_1 √(R_e δ/f_2)`; the
+/// dashpot's E_eff a is then that of the tangent stiffness.
+///
 /// Energies: spring `2/5 F_el δ`; damping `(F − F_el) δ̇ Δt`, so the part that clipping takes out of the
 /// dashpot is not counted twice.
 ///
 /// # Source
-/// W (3.1), (3.3).
+/// W (3.1), (3.3); elliptical contact: B (1)–(7) with the errata of PHYSICS.md.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hertz {
     effective_modulus: f64,
@@ -70,9 +73,11 @@ impl NormalLaw for Hertz {
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, _memory: &mut [L]) -> NormalResponse<L> {
-        let contact_radius = (touch.effective_radius * touch.overlap).sqrt();
-        let spring = L::splat(4.0 / 3.0 * self.effective_modulus) * contact_radius * touch.overlap;
-        let dashpot = self.dashpot.coefficient(contact_radius, touch.effective_mass);
+        let overlap = touch.overlap / touch.overlap_factor;
+        let radius = (touch.effective_radius * overlap).sqrt();
+        let spring = L::splat(4.0 / 3.0 * self.effective_modulus) * radius * overlap;
+        let radius_per_factor = radius / touch.overlap_factor;
+        let dashpot = self.dashpot.coefficient(radius_per_factor, touch.effective_mass);
         // The floor comes first: a comparison with NaN is false, so a NaN stays visible.
         let force = L::splat(self.floor).max(spring + dashpot * touch.overlap_rate);
         let energies = Energies {
@@ -82,8 +87,8 @@ impl NormalLaw for Hertz {
         };
         NormalResponse {
             force,
-            contact_radius,
-            stiffness: L::splat(2.0 * self.effective_modulus) * contact_radius,
+            contact_radius: touch.radius_factor * radius,
+            stiffness: L::splat(2.0 * self.effective_modulus) * radius_per_factor,
             dashpot,
             energies,
         }
@@ -93,7 +98,7 @@ impl NormalLaw for Hertz {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::testing::{Impact, choice, impact, pair, properties, touch};
+    use crate::force::testing::{Impact, choice, impact, nmc, pair, properties, table, touch};
 
     const RADIUS: f64 = 5e-3;
     const MASS: f64 = 1e-2;
@@ -169,5 +174,20 @@ mod tests {
         let law = law("tsuji", "true", 0.3);
         assert_eq!(law.evaluate(&touch(1e-6, -10.0, RADIUS, MASS), &mut []).force, 0.0);
         assert!(law.evaluate(&touch(1e-6, f64::NAN, RADIUS, MASS), &mut []).force.is_nan());
+    }
+
+    #[test]
+    fn an_elliptical_contact_has_the_force_of_the_reference() {
+        // Becker and Kamlah's first case, below yield, is Hertz between ellipsoids.
+        let g = &table(include_str!("../../tests/data/becker_kamlah_case1_geometry.csv"))[0];
+        let law = Hertz::new(&pair(nmc(), choice(Role::Normal, "hertz", &[])));
+        let rows = table(include_str!("../../tests/data/becker_kamlah_case1.csv"));
+        for row in rows[1..].iter().take_while(|row| row[0] < g[8]) {
+            let touch = Touch { radius_factor: g[2], overlap_factor: g[3], ..touch(row[0], 0.0, g[0], MASS) };
+            let response = law.evaluate(&touch, &mut []);
+            assert!((response.force / row[1] - 1.0).abs() < 1e-12, "{} {}", response.force, row[1]);
+            let radius = (g[0] * row[0] / g[3]).sqrt() * g[2];
+            assert!((response.contact_radius / radius - 1.0).abs() < 1e-14);
+        }
     }
 }

@@ -62,6 +62,17 @@ pub trait Lane:
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
     /// `table[(code >> bits) & 7]` for the first `WIDTH` codes.
     fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self;
+    /// `function` of each lane by itself, such as one of `libm`: the scalar bits whatever the width.
+    #[inline(always)]
+    #[must_use]
+    fn map(self, function: impl Fn(f64) -> f64) -> Self {
+        let mut values = [0.0; 8];
+        self.store(&mut values);
+        for value in &mut values[..Self::WIDTH] {
+            *value = function(*value);
+        }
+        Self::load(&values)
+    }
 }
 
 /// Ask for the cache lines of `count` values from place `index` on to be brought near, there or not. Changes nothing.

@@ -17,8 +17,14 @@ pub struct Touch<L> {
     pub overlap: L,
     /// δ̇ = −v_rel·n \[m/s\], positive while approaching.
     pub overlap_rate: L,
-    /// Effective radius, 1/R_eff = 1/R_i + 1/R_j \[m\].
+    /// Effective radius, 1/R_eff = 1/R_i + 1/R_j; of an elliptical contact R_e of B (3) \[m\].
     pub effective_radius: L,
+    /// Factor f_1 of an elliptical contact on its equivalent contact radius, 1 for spheres; B (4).
+    pub radius_factor: L,
+    /// Factor f_2 of an elliptical contact on the overlap, 1 for spheres; B (4).
+    pub overlap_factor: L,
+    /// Sum of the mean radii of both particles (spheres: R_i + R_j; before a wall: twice the radius) \[m\].
+    pub size: L,
     /// Effective mass, 1/m_eff = 1/m_i + 1/m_j \[kg\].
     pub effective_mass: L,
     /// Unit normal n from i to j.
@@ -96,6 +102,27 @@ pub struct VectorResponse<L> {
     pub energies: Energies<L>,
 }
 
+impl<L: Lane> VectorResponse<L> {
+    /// This response where `mask` holds, nothing elsewhere.
+    #[inline(always)]
+    #[must_use]
+    pub fn only(self, mask: L::Mask) -> Self {
+        let kept = |value| L::select(mask, value, L::splat(0.0));
+        let e = self.energies;
+        Self {
+            value: self.value.map(kept),
+            energies: Energies {
+                elastic: kept(e.elastic),
+                viscoelastic: kept(e.viscoelastic),
+                damping: kept(e.damping),
+                viscous: kept(e.viscous),
+                friction: kept(e.friction),
+                plastic: kept(e.plastic),
+            },
+        }
+    }
+}
+
 /// One memory column of a law.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
@@ -109,10 +136,20 @@ pub struct Column {
 pub trait NormalLaw: Copy + Send + Sync + 'static {
     /// Number of memory columns.
     const MEMORY: usize;
+    /// The memory outlives the touch (a dent), or the law acts beyond it (an adhesive neck): `evaluate` then sees
+    /// overlaps down to `−range · R_eff`, and must return force and contact radius 0 where the bodies are apart.
+    const LASTS: bool = false;
     /// Names and units of the memory columns, `MEMORY` of them.
     fn columns(&self) -> Vec<Column>;
+    /// Gap over R_eff up to which the memory lasts, for a law that [`Self::LASTS`]; beyond it ends.
+    fn range(&self) -> f64 {
+        0.0
+    }
     /// Recompute what depends on the time step \[s\]; called before the first touch and whenever it changes.
     fn prepare(&mut self, time_step: f64);
+    /// After `prepare`: the relaxed limit of a law that depends on rate, for the quasi-static routine, where time has no
+    /// meaning and every process is infinitely slow. A rate-independent law has nothing to do.
+    fn relax(&mut self) {}
     /// Force of one touch; `memory` has `MEMORY` entries, all zero at first touch.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
 }
@@ -125,6 +162,8 @@ pub trait TangentialLaw: Copy + Send + Sync + 'static {
     fn columns(&self) -> Vec<Column>;
     /// Recompute what depends on the time step \[s\].
     fn prepare(&mut self, time_step: f64);
+    /// The relaxed limit, see [`NormalLaw::relax`].
+    fn relax(&mut self) {}
     /// Force of one touch.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
 }
@@ -143,7 +182,9 @@ pub trait RollingLaw: Copy + Send + Sync + 'static {
 
 /// What a whole contact (normal, tangential, rolling) returns to the pass.
 #[derive(Debug, Clone, Copy)]
-pub struct ContactResponse<L> {
+pub struct ContactResponse<L: Lane> {
+    /// The bodies press or pull on each other: false over a dent that is no longer reached.
+    pub joined: L::Mask,
     /// Normal force F_n \[N\], compression positive.
     pub normal_force: L,
     /// Tangential force on i \[N\].
@@ -167,10 +208,16 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     const TANGENTIAL: bool;
     /// Has rolling or twisting moments.
     const ROLLING: bool;
+    /// See [`NormalLaw::LASTS`].
+    const LASTS: bool;
+    /// See [`NormalLaw::range`].
+    fn range(&self) -> f64;
     /// Names and units of the memory columns.
     fn columns(&self) -> Vec<Column>;
     /// Recompute what depends on the time step \[s\].
     fn prepare(&mut self, time_step: f64);
+    /// The relaxed limit, see [`NormalLaw::relax`].
+    fn relax(&mut self) {}
     /// The normal law's part; `memory` has `NORMAL_MEMORY` entries.
     fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
     /// The other laws' part and the whole response; `memory` has the remaining entries.

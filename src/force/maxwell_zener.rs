@@ -85,6 +85,10 @@ pub fn split_last_branch(branches: &[MaxwellBranch], count: usize) -> Vec<Maxwel
 /// relaxed contact, and the dissipation may be negative on unloading: Radok's superposition holds
 /// for growing contacts. What clipping takes out counts as damping, of either sign.
 ///
+/// Between ellipsoids δ/f_2 and R_e of the elliptical contact take the places of δ and R_eff, as in Hertz's law: the
+/// force keeps both elastic limits. This is an extension of W, which treats spheres. While a contact rolls to places
+/// of other curvature the branches keep the force they have, and the energies are those of the present curvature.
+///
 /// # Source
 /// W (3.7), (3.11)–(3.14); prefactor by the errata (√R_eff/(1−ν²) throughout).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -189,15 +193,24 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
         }
     }
 
+    /// The limit Δt/τ → ∞: no branch holds anything, Hertz with E_∞ is left.
+    fn relax(&mut self) {
+        for k in (0..BRANCHES).filter(|&k| self.rate[k] > 0.0) {
+            (self.decay[k], self.gain[k]) = (0.0, 0.0);
+        }
+    }
+
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
         let (radius, overlap, last) = (touch.effective_radius, touch.overlap, memory[0]);
         let mean = L::splat(0.5) * (overlap + last);
-        let contact_radius = (radius * overlap).sqrt();
+        let factor = touch.overlap_factor;
+        let (scaled, last_scaled) = (overlap / factor, last / factor);
+        let hertz_radius = (radius * scaled).sqrt();
         // √R_eff δ^{3/2} and its change over the step.
-        let hertzian = contact_radius * overlap;
-        let change = hertzian - (radius * last).sqrt() * last;
-        let increment = if self.midpoint { (radius * mean).sqrt() * (overlap - last) } else { change };
+        let hertzian = hertz_radius * scaled;
+        let change = hertzian - (radius * last_scaled).sqrt() * last_scaled;
+        let increment = if self.midpoint { (radius * (mean / factor)).sqrt() * (scaled - last_scaled) } else { change };
 
         let spring = L::splat(self.spring) * hertzian;
         let mut held = spring;
@@ -218,13 +231,14 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
         }
         memory[0] = overlap;
 
-        let dashpot = self.dashpot.coefficient(contact_radius, touch.effective_mass);
+        let radius_per_factor = hertz_radius / factor;
+        let dashpot = self.dashpot.coefficient(radius_per_factor, touch.effective_mass);
         let force = L::splat(self.floor).max(held + dashpot * touch.overlap_rate);
         energies.damping = (force - held) * touch.overlap_rate * L::splat(self.time_step);
         NormalResponse {
             force,
-            contact_radius,
-            stiffness: L::splat(1.5 * self.spontaneous) * contact_radius,
+            contact_radius: touch.radius_factor * hertz_radius,
+            stiffness: L::splat(1.5 * self.spontaneous) * radius_per_factor,
             dashpot,
             energies,
         }

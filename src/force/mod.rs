@@ -1,8 +1,10 @@
 //! Contact laws: pure functions of one touch and that contact's own memory, and the loop around them.
 
+pub mod becker_kamlah;
 pub mod composition;
 pub mod dashpot;
 mod documentation;
+pub mod ellipsoid;
 pub mod geometry;
 pub mod hertz;
 pub mod lane;
@@ -11,6 +13,7 @@ pub mod maxwell_zener;
 pub mod mindlin;
 pub mod observe;
 pub mod pass;
+pub mod plastic;
 pub mod registry;
 pub mod rolling;
 pub mod shear;
@@ -18,4 +21,5 @@ pub mod simd;
 pub mod slider;
 #[cfg(test)]
 mod testing;
+pub mod thornton;
 pub mod touches;

@@ -50,8 +50,9 @@ pub struct Sample {
     pub force: [f64; 3],
     /// Normal force \[N\].
     pub normal_force: f64,
-    /// Distances of the contact point from the two centres \[m\].
-    pub arms: [f64; 2],
+    /// `−r·F` of both bodies, r from the centre to the contact point, F the force on the body \[N m\] (between spheres
+    /// its normal part).
+    pub virials: [f64; 2],
     /// Counted here: the lower id is owned by this rank.
     pub counted: bool,
     /// The second is this wall.
@@ -168,8 +169,15 @@ impl Observed<'_> {
         }
     }
 
-    /// Take in the present contact; `first` is the local index of its first particle.
-    pub fn touch(&mut self, first: usize, pair: &PairTouch<f64>, response: &ContactResponse<f64>, wall: Option<u32>) {
+    /// Take in the present contact; `first` is the local index of its first particle, `virials` as in [`Sample`].
+    pub fn touch(
+        &mut self,
+        first: usize,
+        pair: &PairTouch<f64>,
+        response: &ContactResponse<f64>,
+        virials: [f64; 2],
+        wall: Option<u32>,
+    ) {
         let touch = &pair.touch;
         let force = sub(response.tangential_force, scale(touch.normal, response.normal_force));
         if let Some(place) = self.forces.get_mut(self.line - self.first_line) {
@@ -182,7 +190,7 @@ impl Observed<'_> {
             overlap: touch.overlap,
             force: scale(force, -1.0),
             normal_force: response.normal_force,
-            arms: [pair.arm_first, pair.arm_second],
+            virials,
             counted: first < self.owned,
             wall: wall.map(|wall| wall as usize),
         };

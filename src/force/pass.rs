@@ -13,7 +13,10 @@ use super::touches::{BATCH, BlockTouches, Content, LawTouch};
 use crate::config::PairConfig;
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
+use crate::state::shape::Shape;
 use std::ops::Range;
+
+mod ellipsoids;
 
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
@@ -29,7 +32,8 @@ const NEAREST_CACHES: usize = 1 << 20;
 pub struct PassInput<'a> {
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), then the ledger's.
+    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), 16 (two torques, between
+    /// ellipsoids), then the ledger's.
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
@@ -44,8 +48,9 @@ pub struct PassInput<'a> {
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; then
-    /// the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
+    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
+    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's
+    /// `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
     /// Number of the first block's first line, a multiple of eight.
     pub first: usize,
@@ -53,13 +58,30 @@ pub struct LineRing<'a> {
     pub mask: usize,
 }
 
+/// Owned particles and ghosts as a pass reads them, from a section's origin on.
+#[derive(Debug, Clone, Copy)]
+pub struct BodyData<'a> {
+    /// Records.
+    pub records: &'a [Record],
+    /// Semi-axes and orientations; empty when every particle of all ranks is a sphere.
+    pub shapes: &'a [Shape],
+}
+
+impl BodyData<'_> {
+    /// From this place on.
+    #[must_use]
+    pub fn from(&self, origin: usize) -> Self {
+        Self { records: &self.records[origin..], shapes: &self.shapes[origin.min(self.shapes.len())..] }
+    }
+}
+
 /// Some blocks of a section to evaluate.
 #[derive(Debug)]
 pub struct Job<'a> {
     /// What all passes share.
     pub input: &'a PassInput<'a>,
-    /// Records of owned particles and ghosts from the section's origin on.
-    pub records: &'a [Record],
+    /// Owned particles and ghosts from the section's origin on.
+    pub bodies: BodyData<'a>,
     /// The section; its memory moves on by one step.
     pub section: &'a mut Section,
     /// Numbers of the blocks.
@@ -75,21 +97,23 @@ pub type Excess = Option<(usize, f64)>;
 
 /// The pass of one pair of materials.
 pub trait PairPass: Send + Sync {
-    /// Recompute what depends on the time step \[s\].
-    fn prepare(&mut self, time_step: f64);
+    /// Recompute what depends on the time step \[s\]; `relaxed`: in the limit of infinitely slow processes.
+    fn prepare(&mut self, time_step: f64, relaxed: bool);
     /// Memory columns.
     fn columns(&self) -> Vec<Column>;
     /// Numbers per output line that this law needs.
     fn stride(&self) -> usize;
     /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
     fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
+    /// Gap over the effective radius up to which contacts keep their memory; 0 if it ends with the touch.
+    fn range(&self) -> f64;
     /// Evaluate some blocks of a section.
     fn run(&self, job: Job) -> Excess;
     /// Look at some blocks of a section without changing anything.
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
@@ -98,33 +122,47 @@ pub trait PairPass: Send + Sync {
 
 struct LawPass<C> {
     law: C,
+    /// There are ellipsoids.
+    ellipsoids: bool,
 }
 
-struct Builder;
+struct Builder {
+    ellipsoids: bool,
+}
 
 impl LawVisitor for Builder {
     type Output = Box<dyn PairPass>;
     fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        Box::new(LawPass { law })
+        Box::new(LawPass { law, ellipsoids: self.ellipsoids })
     }
 }
 
-/// The pass for a configured pair of materials.
+/// The pass for a configured pair of materials, in a run with or without ellipsoids.
 #[must_use]
-pub fn build(pair: &PairConfig) -> Box<dyn PairPass> {
-    composition::visit(pair, Builder)
+pub fn build(pair: &PairConfig, ellipsoids: bool) -> Box<dyn PairPass> {
+    composition::visit(pair, Builder { ellipsoids })
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
-    fn prepare(&mut self, time_step: f64) {
+    fn prepare(&mut self, time_step: f64, relaxed: bool) {
         self.law.prepare(time_step);
+        if relaxed {
+            self.law.relax();
+        }
     }
 
     fn columns(&self) -> Vec<Column> {
-        self.law.columns()
+        let mut columns = self.law.columns();
+        if self.ellipsoids {
+            columns.extend(ellipsoids::normal_columns());
+        }
+        columns
     }
 
     fn stride(&self) -> usize {
+        if self.ellipsoids {
+            return ellipsoids::WIDTH;
+        }
         match (C::TANGENTIAL, C::ROLLING) {
             (_, true) => 12,
             (true, false) => 8,
@@ -137,6 +175,9 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             overlap,
             overlap_rate: 0.0,
             effective_radius,
+            radius_factor: 1.0,
+            overlap_factor: 1.0,
+            size: 4.0 * effective_radius,
             effective_mass: 1.0,
             normal: [0.0, 0.0, 1.0],
             slip_velocity: [0.0; 3],
@@ -147,12 +188,20 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
     }
 
+    fn range(&self) -> f64 {
+        if C::LASTS { self.law.range() } else { 0.0 }
+    }
+
     fn run(&self, job: Job) -> Excess {
+        if self.ellipsoids {
+            return self.run_ellipsoids(job);
+        }
         if job.section.partners == Partners::Wall {
             return self.walls(job);
         }
-        let Job { input, records, section, blocks, mut lines, touches } = job;
-        let content = Content { rolling: C::ROLLING, ledger: input.ledger };
+        let Job { input, bodies, section, blocks, mut lines, touches } = job;
+        let records = bodies.records;
+        let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
         let mut excess = None;
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);
@@ -186,11 +235,16 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     fn observe(
         &self,
         input: &PassInput,
-        records: &[Record],
+        bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
         observed: &mut Observed,
     ) {
+        if self.ellipsoids {
+            self.observe_ellipsoids(input, bodies, section, blocks, observed);
+            return;
+        }
+        let records = bodies.records;
         if !observed.single() && section.partners != Partners::Wall {
             let [stiffness, ratio] = match input.simd {
                 // SAFETY: as in `run`.
@@ -213,8 +267,15 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 }
 
 impl<C: ContactLaw> LawPass<C> {
+    /// Lanes whose law is asked.
+    #[inline(always)]
+    fn alive<L: Lane>(&self, pair: &PairTouch<L>) -> L::Mask {
+        pair.alive(if C::LASTS { self.law.range() } else { 0.0 })
+    }
+
     fn walls(&self, job: Job) -> Excess {
-        let Job { input, records, section, blocks, lines, .. } = job;
+        let Job { input, bodies, section, blocks, lines, .. } = job;
+        let records = bodies.records;
         let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
@@ -269,7 +330,7 @@ impl<C: ContactLaw> LawPass<C> {
                 values[column] = L::load(&memory[column].0[place % BLOCK..]);
             }
             let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-            stiffness = L::select(pair.touching, response.stiffness, zero).max(stiffness);
+            stiffness = L::select(self.alive(&pair), response.stiffness, zero).max(stiffness);
             ratio = L::select(pair.touching, pair.touch.overlap / pair.min_radius, zero).max(ratio);
         }
         let mut lanes = [0.0; 2 * BLOCK];
@@ -295,14 +356,19 @@ impl<C: ContactLaw> LawPass<C> {
             let (a, b) = (Bodies::gather(records, first), Bodies::gather(records, &section.second[place..=place]));
             geometry::spheres(&a, &b, &section.shift[place..=place], input.motion)
         };
-        if !pair.touching {
+        if !self.alive(&pair) {
             observed.no_touch();
             return;
         }
         let mut memory = [0.0; MAX_MEMORY];
         section.read_memory(place, &mut memory);
         let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
-        observed.touch(section.origin + first[0] as usize, &pair, &response, wall);
+        if C::LASTS && !response.joined {
+            observed.no_touch();
+            return;
+        }
+        let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
+        observed.touch(section.origin + first[0] as usize, &pair, &response, virials, wall);
     }
 }
 
@@ -339,7 +405,7 @@ impl<C: ContactLaw> Laws<'_, C> {
         for (block, touches) in touches.iter_mut().enumerate() {
             for lane in lanes() {
                 let pair = touches.touch::<L>(lane);
-                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.touching, |memory| {
+                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
                     self.law.normal(&pair.touch, memory)
                 });
                 touches.put_normal(lane, &normal, LEDGER);
@@ -351,7 +417,7 @@ impl<C: ContactLaw> Laws<'_, C> {
                 let rows = &mut lines.values[slot..slot + L::WIDTH * self.stride];
                 let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
                 let rest = C::NORMAL_MEMORY..C::MEMORY;
-                let response = with_memory(&mut memory[of(block)], rest, lane, pair.touching, |memory| {
+                let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
                     self.law.complete(&pair.touch, &normal, memory)
                 });
                 self.write::<L, LEDGER>(&pair, &response, rows, false);
@@ -361,9 +427,10 @@ impl<C: ContactLaw> Laws<'_, C> {
 
     /// Law and output of a wall contact.
     fn wall<const LEDGER: bool>(&self, pair: &PairTouch<f64>, memory: &mut [CacheLine], lane: usize, rows: &mut [f64]) {
+        let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
         let response =
-            with_memory(memory, 0..C::MEMORY, lane, pair.touching, |memory| self.law.evaluate(&pair.touch, memory));
-        self.write::<f64, LEDGER>(&pair.into(), &response, rows, true);
+            with_memory(memory, 0..C::MEMORY, lane, pair.alive, |memory| self.law.evaluate(&pair.touch, memory));
+        self.write::<f64, LEDGER>(&pair, &response, rows, true);
     }
 
     /// Output of `L::WIDTH` contacts.
@@ -376,7 +443,7 @@ impl<C: ContactLaw> Laws<'_, C> {
         wall: bool,
     ) {
         let zero = L::splat(0.0);
-        let kept = |value: L| L::select(pair.touching, value, zero);
+        let kept = |value: L| L::select(pair.alive, value, zero);
         let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
         let stride = self.stride;
         L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
@@ -476,7 +543,7 @@ fn geometry_of<L: Lane>(
     for (block, touches) in blocks.zip(touches) {
         for lane in lanes() {
             let pair = geometry::touch(&touches.relative::<L>(lane));
-            touches.put_touch(lane, &pair);
+            touches.put_touch(lane, &pair, content.range);
             // Written so that NaN counts as a fault.
             let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
             if excess.is_none() && L::any(pair.touching & !within) {
@@ -488,13 +555,13 @@ fn geometry_of<L: Lane>(
     excess
 }
 
-/// Let a law work on some memory columns of the lanes from `lane` on; lanes that do not touch forget.
+/// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
 #[inline(always)]
 fn with_memory<L: Lane, T>(
     memory: &mut [CacheLine],
     columns: Range<usize>,
     lane: usize,
-    touching: L::Mask,
+    alive: L::Mask,
     law: impl FnOnce(&mut [L]) -> T,
 ) -> T {
     let zero = L::splat(0.0);
@@ -506,7 +573,7 @@ fn with_memory<L: Lane, T>(
     }
     let response = law(values);
     for (value, column) in values.iter().zip(memory) {
-        L::select(touching, *value, zero).store(&mut column.0[lane..]);
+        L::select(alive, *value, zero).store(&mut column.0[lane..]);
     }
     response
 }

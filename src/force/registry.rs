@@ -48,8 +48,10 @@ macro_rules! register {
 
 register! {
     normal:
+        becker_kamlah
         hertz
-        maxwell_zener;
+        maxwell_zener
+        thornton;
     tangential:
         mindlin;
     rolling:

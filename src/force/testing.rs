@@ -44,12 +44,25 @@ pub fn pair(properties: PairProperties, normal: LawChoice) -> PairConfig {
     PairConfig { materials: [0, 0], properties, normal, tangential: None, rolling: None }
 }
 
+/// NMC of B Table 1: E = 142 GPa, ν = 0.25, Y = 7.9 GPa.
+pub fn nmc() -> PairProperties {
+    PairProperties { yield_stress: [Some(7.9e9); 2], ..properties(142e9, 0.25, Vec::new()) }
+}
+
+/// Rows of numbers of a reference table, without its header.
+pub fn table(csv: &str) -> Vec<Vec<f64>> {
+    csv.lines().skip(1).map(|line| line.split(',').map(|field| field.trim().parse().unwrap()).collect()).collect()
+}
+
 /// A touch along z without tangential motion.
 pub fn touch(overlap: f64, overlap_rate: f64, effective_radius: f64, effective_mass: f64) -> Touch<f64> {
     Touch {
         overlap,
         overlap_rate,
         effective_radius,
+        radius_factor: 1.0,
+        overlap_factor: 1.0,
+        size: 4.0 * effective_radius,
         effective_mass,
         normal: [0.0, 0.0, 1.0],
         slip_velocity: [0.0; 3],

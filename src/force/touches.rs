@@ -10,13 +10,18 @@ use crate::contact::section::{BLOCK, CacheLine};
 /// Blocks in a batch: few, so that they stay in the nearest cache.
 pub const BATCH: usize = 4;
 
+/// Stands for the overlap of lanes whose law is not asked.
+const DEAD: f64 = f64::NEG_INFINITY;
+
 /// What is passed on only where it is used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Content {
     /// Relative spins, for rolling laws.
     pub rolling: bool,
     /// Imposed velocities and energies, for the energy ledger.
     pub ledger: bool,
+    /// The normal law's [`super::law::NormalLaw::range`], 0 if its memory ends with the touch.
+    pub range: f64,
 }
 
 /// Some numbers of each contact of a block.
@@ -104,10 +109,9 @@ impl BlockTouches {
 
     /// Take in the touches of the lanes from `lane` on.
     #[inline(always)]
-    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>) {
+    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>, range: f64) {
         let touch = &pair.touch;
-        // Zero says that a lane does not touch.
-        let overlap = L::select(pair.touching, touch.overlap, L::splat(0.0));
+        let overlap = L::select(pair.alive(range), touch.overlap, L::splat(DEAD));
         self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_radius, touch.effective_mass]);
         self.touch.put(4, lane, &touch.normal);
         self.touch.put(7, lane, &touch.slip_velocity);
@@ -120,12 +124,15 @@ impl BlockTouches {
     pub fn touch<L: Lane>(&self, lane: usize) -> LawTouch<L> {
         let overlap = self.touch.one(0, lane);
         LawTouch {
-            // NaN touches.
-            touching: !L::splat(0.0).at_least(overlap),
+            // NaN is alive.
+            alive: !L::splat(DEAD).at_least(overlap),
             touch: Touch {
                 overlap,
                 overlap_rate: self.touch.one(1, lane),
                 effective_radius: self.touch.one(2, lane),
+                radius_factor: L::splat(1.0),
+                overlap_factor: L::splat(1.0),
+                size: self.relative.one::<L>(12, lane) + self.relative.one(13, lane),
                 effective_mass: self.touch.one(3, lane),
                 normal: self.touch.vector(4, lane),
                 slip_velocity: self.touch.vector(7, lane),
@@ -171,8 +178,8 @@ impl BlockTouches {
 /// What the laws' loops need of some touches.
 #[derive(Debug, Clone, Copy)]
 pub struct LawTouch<L: Lane> {
-    /// Lanes that touch.
-    pub touching: L::Mask,
+    /// Lanes whose law is asked.
+    pub alive: L::Mask,
     /// The law's view.
     pub touch: Touch<L>,
     /// Distance of the contact point from the first's centre along n \[m\].
@@ -183,11 +190,13 @@ pub struct LawTouch<L: Lane> {
     pub imposed_velocity: Vector<L>,
 }
 
-impl<L: Lane> From<&PairTouch<L>> for LawTouch<L> {
+impl<L: Lane> LawTouch<L> {
+    /// Straight from geometry, for a law of this range.
     #[inline(always)]
-    fn from(pair: &PairTouch<L>) -> Self {
+    #[must_use]
+    pub fn new(pair: &PairTouch<L>, range: f64) -> Self {
         Self {
-            touching: pair.touching,
+            alive: pair.alive(range),
             touch: pair.touch,
             arm_first: pair.arm_first,
             arm_second: pair.arm_second,

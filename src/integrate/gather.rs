@@ -9,7 +9,7 @@ use crate::force::pass::LEDGER_STRIDE;
 /// Output lines of the contact passes as the particles of one strip see them.
 #[derive(Debug, Clone, Copy)]
 pub struct Lines<'a> {
-    /// Numbers per line that hold forces, torques and moments: 4, 8 or 12.
+    /// Numbers per line that hold forces, torques and moments: 4, 8, 12, or 16 between ellipsoids.
     pub width: usize,
     /// Numbers per line, with the ledger's.
     pub stride: usize,
@@ -41,9 +41,11 @@ impl Lines<'_> {
             (4, 4) => self.sums::<L, 4, 4>(offsets, ends, loads),
             (8, 8) => self.sums::<L, 8, 8>(offsets, ends, loads),
             (12, 12) => self.sums::<L, 12, 12>(offsets, ends, loads),
+            (16, 16) => self.sums::<L, 16, 16>(offsets, ends, loads),
             (4, _) => self.sums::<L, 4, { 4 + LEDGER_STRIDE }>(offsets, ends, loads),
             (8, _) => self.sums::<L, 8, { 8 + LEDGER_STRIDE }>(offsets, ends, loads),
-            _ => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(offsets, ends, loads),
+            (12, _) => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(offsets, ends, loads),
+            _ => self.sums::<L, 16, { 16 + LEDGER_STRIDE }>(offsets, ends, loads),
         }
     }
 
@@ -68,6 +70,10 @@ impl Lines<'_> {
                 let second = usize::from(end.is_second());
                 let sign = L::splat(SIGN[second]);
                 force = force + sign * L::load(&line[..4]);
+                if WIDTH == 16 {
+                    torque = torque + L::load(&line[4 + 4 * second..][..4]);
+                    continue;
+                }
                 if WIDTH >= 8 {
                     torque = torque + L::splat(line[3 + 4 * second]) * L::load(&line[4..8]);
                 }

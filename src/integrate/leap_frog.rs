@@ -4,6 +4,7 @@
 //! half the old one and (2.4) half the new one.
 
 use super::gather::Lines;
+use super::rotation::Rotation;
 use crate::contact::list::{CHUNK, End};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::avx2::F64x4;
@@ -12,6 +13,7 @@ use crate::force::lane::{Lane, RECORD, prefetch};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, Record, padded, trimmed};
+use crate::state::shape::Shape;
 use std::ops::Range;
 
 /// What is the same for all particles in one step.
@@ -87,6 +89,8 @@ pub struct Slice<'a> {
     velocity: &'a mut [[f64; 4]],
     spin: &'a mut [[f64; 4]],
     orientation: &'a mut [[f64; 4]],
+    /// Their shapes; empty when every particle of all ranks is a sphere.
+    pub shape: &'a mut [Shape],
     ledger: &'a mut [[f64; LEDGER.len()]],
     reference: &'a mut [[f64; 4]],
     crossed: &'a mut [[i8; 4]],
@@ -103,6 +107,7 @@ impl<'a> Slice<'a> {
             velocity: &mut particles.velocity,
             spin: &mut particles.spin,
             orientation: &mut particles.orientation,
+            shape: if particles.ellipsoids { &mut particles.shape[..owned] } else { &mut [] },
             ledger: &mut particles.ledger,
             reference: &mut reference.position,
             crossed: &mut reference.crossed[..owned],
@@ -117,10 +122,12 @@ impl<'a> Slice<'a> {
         let (velocity, velocity_high) = self.velocity.split_at_mut(count);
         let (spin, spin_high) = self.spin.split_at_mut(count);
         let (orientation, orientation_high) = self.orientation.split_at_mut(count.min(self.orientation.len()));
+        let (shape, shape_high) = self.shape.split_at_mut(count.min(self.shape.len()));
         let (ledger, ledger_high) = self.ledger.split_at_mut(count.min(self.ledger.len()));
         let (reference, reference_high) = self.reference.split_at_mut(count);
         let (crossed, crossed_high) = self.crossed.split_at_mut(count);
-        let low = Self { start: self.start, record, image, velocity, spin, orientation, ledger, reference, crossed };
+        let low =
+            Self { start: self.start, record, image, velocity, spin, orientation, shape, ledger, reference, crossed };
         let high = Self {
             start: self.start + count,
             record: record_high,
@@ -128,6 +135,7 @@ impl<'a> Slice<'a> {
             velocity: velocity_high,
             spin: spin_high,
             orientation: orientation_high,
+            shape: shape_high,
             ledger: ledger_high,
             reference: reference_high,
             crossed: crossed_high,
@@ -249,7 +257,7 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
         let acceleration = force * inverse_mass + pull;
         let mut velocity = L::load(&slice.velocity[index]) + kick * acceleration;
         let mut position = scale * L::load(&record[..4]) + drift * velocity;
-        if motion.rotation {
+        if motion.rotation && slice.shape.is_empty() {
             let angular = torque * L::splat(record[11]);
             let spin = L::load(&slice.spin[index]) + kick * angular;
             spin.store(&mut slice.spin[index]);
@@ -259,6 +267,9 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
             }
         }
         position.store(&mut record[..4]);
+        if !slice.shape.is_empty() {
+            turn(slice, index, [load[4], load[5], load[6]], motion);
+        }
         if L::any(zero.greater(position) | position.at_least(sides)) {
             velocity.store(&mut slice.velocity[index]);
             wrap(slice, index, motion, result);
@@ -276,6 +287,19 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
         if !(squared <= result.max_displacement_squared) {
             result.take_displacement(squared, (slice.start + index) as u32);
         }
+    }
+}
+
+/// Turn an ellipsoid.
+fn turn(slice: &mut Slice, index: usize, torque: [f64; 3], motion: &StepMotion) {
+    let times = Rotation { kick: 0.5 * (motion.previous_time_step + motion.time_step), time_step: motion.time_step };
+    let (record, shape) = (&mut slice.record[index], &mut slice.shape[index]);
+    if record.inverse_mass > 0.0 {
+        let spins = times.advance(shape, trimmed(slice.spin[index]), torque, record.inverse_mass);
+        slice.spin[index] = padded(spins.half);
+        record.spin = spins.full;
+    } else {
+        times.advance_driven(shape, record.spin);
     }
 }
 

@@ -16,7 +16,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Version of the format: raised when older programs could not read the file.
-const FORMAT: &str = "2";
+const FORMAT: &str = "3";
 
 /// The part of a checkpoint that one rank has read.
 #[derive(Debug, Clone, PartialEq)]
@@ -250,6 +250,7 @@ macro_rules! for_each_particle_field {
         $do!(species, u32, 1);
         $do!(position, f64, 3);
         $do!(radius, f64, 1);
+        $do!(semi_axes, f64, 3);
         $do!(velocity, f64, 3);
         $do!(full_velocity, f64, 3);
         $do!(spin, f64, 3);

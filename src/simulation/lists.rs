@@ -30,13 +30,25 @@ impl Model {
     #[must_use]
     pub fn inner_skin(&self) -> f64 {
         let fraction = 0.25 * self.config.parallel.skin;
-        2.0 * self.max_radius * if INNER_SKIN < fraction { INNER_SKIN } else { fraction }
+        let skin = 2.0 * self.max_radius * if INNER_SKIN < fraction { INNER_SKIN } else { fraction };
+        let reach = self.memory_reach();
+        if reach > skin { reach } else { skin }
+    }
+
+    /// Largest gap over which a contact may keep its memory, with room for rounding \[m\]. No effective radius
+    /// is above the largest radius.
+    fn memory_reach(&self) -> f64 {
+        let range = self.passes.iter().map(|pass| pass.range()).fold(0.0, |m, r| if r > m { r } else { m });
+        1.01 * range * self.max_radius
     }
 
     /// Skin of the Verlet list \[m\].
     #[must_use]
     pub fn outer_skin(&self) -> f64 {
-        2.0 * self.max_radius * self.config.parallel.skin
+        let skin = 2.0 * self.max_radius * self.config.parallel.skin;
+        // Some room to move beside what the contacts' memory needs.
+        let least = 2.0 * self.memory_reach();
+        if least > skin { least } else { skin }
     }
 }
 

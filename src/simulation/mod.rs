@@ -3,6 +3,7 @@
 
 mod fault;
 mod lists;
+mod relaxation;
 mod report;
 mod snapshot;
 mod strips;
@@ -22,7 +23,7 @@ use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, agree}
 use crate::force::geometry::CellMotion;
 use crate::force::law::Column;
 use crate::force::observe::{Observation, Wanted};
-use crate::force::pass::{LEDGER_STRIDE, PairPass, PassInput};
+use crate::force::pass::{BodyData, LEDGER_STRIDE, PairPass, PassInput};
 use crate::force::simd::Simd;
 use crate::integrate::leap_frog::{Reference, Slice, StepMotion, StepResult};
 use crate::integrate::time_step::TimeStepControl;
@@ -33,9 +34,6 @@ use crate::state::{ContactMemory, GlobalState, ParticleState};
 use lists::ListBudget;
 use std::sync::Arc;
 use strips::{LineBuffers, PassFault, Phase};
-
-/// Every law may damp or rub, so ghosts always carry velocities.
-const GHOSTS: HaloContent = HaloContent { velocities: true };
 
 /// What is constant over a run.
 pub struct Model {
@@ -55,6 +53,8 @@ pub struct Model {
     pub max_radius: f64,
     /// Volume of all particles \[m³\].
     pub solid_volume: f64,
+    /// Some particle is no sphere.
+    pub ellipsoids: bool,
     /// Some particle turns or can be made to turn.
     pub rotation: bool,
     /// Instructions that the passes use.
@@ -72,7 +72,12 @@ impl Model {
     #[must_use]
     pub fn extras(&self) -> Extras {
         let output = &self.config.output;
-        Extras { orientation: output.orientations, ledger: output.energy_ledger }
+        Extras { orientation: output.orientations, ellipsoids: self.ellipsoids, ledger: output.energy_ledger }
+    }
+
+    /// What ghosts bring each step. Every law may damp or rub, so they always carry velocities.
+    fn ghosts(&self) -> HaloContent {
+        HaloContent { velocities: true, orientations: self.ellipsoids }
     }
 
     /// The programme looks at the stress: it steers it or ends a stage by it.
@@ -108,7 +113,7 @@ pub struct Simulation {
     timers: Timers,
     threads: usize,
     max_stiffness: f64,
-    prepared_for: f64,
+    prepared_for: Option<(u64, bool)>,
     warned_about_time_step: bool,
     warnings: Vec<String>,
 }
@@ -155,7 +160,7 @@ impl Simulation {
             timers: Timers::default(),
             threads,
             max_stiffness: 0.0,
-            prepared_for: f64::NAN,
+            prepared_for: None,
             warned_about_time_step: false,
             warnings: Vec::new(),
             model,
@@ -250,7 +255,14 @@ impl Simulation {
             self.look(wanted, control, each)?;
         }
         let plan = self.model.programme.plan(&self.global, self.global.time_step);
+        if self.is_quasi_static() {
+            self.begin_increment();
+        }
+        let strain = self.global.strain;
         let (moved, fault) = self.move_on(&plan, looking);
+        if self.is_quasi_static() {
+            self.after_substep(strain);
+        }
         self.agree_on_step(fault, &moved, requests)
     }
 
@@ -289,8 +301,9 @@ impl Simulation {
     }
 
     fn control_is_due(&self) -> bool {
-        self.global.step.is_multiple_of(self.model.config.control_interval)
-            || self.global.step == self.global.stage_start_step
+        !self.is_quasi_static()
+            && (self.global.step.is_multiple_of(self.model.config.control_interval)
+                || self.global.step == self.global.stage_start_step)
     }
 
     /// Present motion of the cell.
@@ -320,17 +333,18 @@ impl Simulation {
 
     /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
     fn update_ghosts(&mut self) {
-        self.halo.update(&self.comm, &mut self.particles, GHOSTS, &mut self.ghost_wraps, |_| ());
+        let content = self.model.ghosts();
+        self.halo.update(&self.comm, &mut self.particles, content, &mut self.ghost_wraps, |_| ());
         take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
     }
 
     /// Let the laws know the time since the last evaluation.
     fn prepare(&mut self) {
-        let elapsed = self.global.previous_time_step;
-        if elapsed.to_bits() != self.prepared_for.to_bits() {
-            self.prepared_for = elapsed;
+        let (elapsed, relaxed) = (self.global.previous_time_step, self.is_quasi_static());
+        if self.prepared_for != Some((elapsed.to_bits(), relaxed)) {
+            self.prepared_for = Some((elapsed.to_bits(), relaxed));
             for pass in &mut self.model.passes {
-                pass.prepare(elapsed);
+                pass.prepare(elapsed, relaxed);
             }
         }
     }
@@ -354,7 +368,7 @@ impl Simulation {
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
         let particles = &self.particles;
-        let observation = phase.observe(&self.contacts, &particles.record, particles.owned, wanted, &mut self.forces);
+        let observation = phase.observe(&self.contacts, bodies(particles), particles.owned, wanted, &mut self.forces);
         self.timers.stop();
         observation
     }
@@ -375,7 +389,7 @@ impl Simulation {
                           reference: &mut Reference,
                           timers: &mut Timers| {
             timers.start(Stage::Contacts);
-            let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], &particles.record, lines);
+            let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], bodies(particles), lines);
             timers.start(Stage::Step);
             let (slice, _) = Slice::new(particles, reference).split(moving);
             let (result, near_fault) = phase.near(contacts, 0..inner, slice, lines, &motion);
@@ -385,7 +399,7 @@ impl Simulation {
             inner_part(particles, contacts, lines, reference, timers)
         } else {
             timers.start(Stage::Halo);
-            halo.update(comm, particles, GHOSTS, ghost_wraps, |particles| {
+            halo.update(comm, particles, model.ghosts(), ghost_wraps, |particles| {
                 let result = inner_part(particles, contacts, lines, reference, timers);
                 timers.start(Stage::Halo);
                 result
@@ -396,7 +410,7 @@ impl Simulation {
                 take_ghost_wraps(ghost_wraps, contacts, reference);
             }
             timers.start(Stage::Contacts);
-            let ghost_fault = phase.kept(contacts, &[Partners::Ghost], &particles.record, lines);
+            let ghost_fault = phase.kept(contacts, &[Partners::Ghost], bodies(particles), lines);
             timers.start(Stage::Step);
             let (_, slice) = Slice::new(particles, reference).split(moving);
             let (border, near_fault) = phase.near(contacts, inner..strips, slice, lines, &motion);
@@ -426,7 +440,8 @@ impl Simulation {
             scale: if kinematics == Kinematics::Bct { [0, 1, 2].map(|k| sides[k] / old[k]) } else { [1.0; 3] },
             sides,
             reference_sides: self.budget.reference_sides,
-            face_velocity: if kinematics == Kinematics::Bc {
+            // In the quasi-static routine the face jumps and then rests, and so does what goes through it.
+            face_velocity: if kinematics == Kinematics::Bc && !self.is_quasi_static() {
                 [0, 1, 2].map(|k| (sides[k] - old[k]) / plan.time_step)
             } else {
                 [0.0; 3]
@@ -463,6 +478,10 @@ impl Simulation {
     fn periodic(&self) -> [bool; 3] {
         self.model.lists.walls.map(|wall| wall.is_none())
     }
+}
+
+fn bodies(particles: &Particles) -> BodyData<'_> {
+    BodyData { records: &particles.record, shapes: &particles.shape }
 }
 
 /// Adjust contacts and counters of ghosts that crossed a periodic face.

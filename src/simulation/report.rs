@@ -8,7 +8,7 @@ use crate::force::observe::{Observation, SUMS, Sample, Sum, Wanted};
 use crate::integrate::time_step::Measured;
 use crate::output::history::HistoryRow;
 use crate::state::LEDGER;
-use crate::state::particles::sphere_mass;
+use crate::state::shape::{ellipsoid_mass, rotational_energy};
 
 /// Particles with fewer contacts than this carry no load in three dimensions (rattlers).
 const RATTLER_CONTACTS: u32 = 4;
@@ -39,6 +39,10 @@ pub struct Report {
     pub wall_force: [f64; 6],
     /// For the time step.
     pub measured: Measured,
+    /// Mean of the net forces on free particles \[N\].
+    pub mean_net_force: f64,
+    /// Mean contact force \[N\]; 0 before anything touches.
+    pub mean_contact_force: f64,
 }
 
 impl Simulation {
@@ -63,6 +67,7 @@ impl Simulation {
         let ends = 2.0 * contacts + wall_contacts;
         let bearing = particles - values[ParticleSum::Rattlers as usize];
         let free = values[ParticleSum::Free as usize];
+        let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
         let row = HistoryRow {
             step: self.global.step,
             time: self.global.time,
@@ -87,6 +92,7 @@ impl Simulation {
                 / (values[Sum::ForceMagnitude as usize] / (contacts + wall_contacts)),
             max_overlap_ratio: largest[1],
             fabric: six(Sum::Fabric as usize, contacts),
+            increment: self.global.quasi_static.map_or(0, |state| state.increments),
         };
         self.timers.stop();
         Report {
@@ -94,6 +100,8 @@ impl Simulation {
             samples: observation.samples,
             wall_force: std::array::from_fn(|k| values[Sum::WallForce as usize + k]),
             measured: Measured { max_stiffness: largest[0], max_speed: largest[2] },
+            mean_net_force: mean(values[ParticleSum::NetForce as usize], free),
+            mean_contact_force: mean(values[Sum::ForceMagnitude as usize], contacts + wall_contacts),
         }
     }
 
@@ -116,8 +124,11 @@ impl Simulation {
                 continue;
             }
             let mass = self.mass(index);
-            let inertia = 0.4 * mass * (record.radius * record.radius);
-            sums[ParticleSum::Kinetic as usize].add(0.5 * (mass * squared + inertia * dot(record.spin)));
+            let kinetic = match self.particles.shape.get(index) {
+                Some(shape) => 0.5 * mass * squared + rotational_energy(mass, shape, record.spin),
+                None => 0.5 * (mass * squared + 0.4 * mass * (record.radius * record.radius) * dot(record.spin)),
+            };
+            sums[ParticleSum::Kinetic as usize].add(kinetic);
             for k in 0..3 {
                 sums[ParticleSum::KineticStress as usize + k].add(mass * (velocity[k] * velocity[k]));
             }
@@ -152,7 +163,7 @@ impl Simulation {
 
     fn mass(&self, particle: usize) -> f64 {
         let species = self.model.species[self.particles.species[particle] as usize];
-        sphere_mass(self.particles.record[particle].radius, species.density)
+        ellipsoid_mass(self.particles.semi_axes(particle), species.density)
     }
 
     /// Sum of all forces on an owned particle at the last look at single contacts \[N\].

@@ -3,6 +3,7 @@
 use super::Simulation;
 use crate::force::observe::Sample;
 use crate::output::snapshot::{SnapshotContact, SnapshotContacts, SnapshotParticle};
+use crate::state::shape::ellipsoid_volume;
 
 impl Simulation {
     /// Owned particles with stress trace and coordination. The trace is that of the mean stress in the
@@ -11,12 +12,12 @@ impl Simulation {
     pub fn snapshot_particles(&self, samples: &[Sample]) -> Vec<SnapshotParticle> {
         let mut virials = vec![[0.0; 2]; self.contacts.lines];
         for sample in samples {
-            virials[sample.line] = sample.arms.map(|arm| arm * sample.normal_force);
+            virials[sample.line] = sample.virials;
         }
         (0..self.particles.owned)
             .map(|index| {
                 let record = &self.particles.record[index];
-                let volume = 4.0 / 3.0 * std::f64::consts::PI * (record.radius * record.radius * record.radius);
+                let volume = ellipsoid_volume(self.particles.semi_axes(index));
                 let ends = self.contacts.ends_of(index).iter();
                 let virial = ends.fold(0.0, |sum, end| sum + virials[end.line()][usize::from(end.is_second())]);
                 SnapshotParticle {
@@ -24,7 +25,8 @@ impl Simulation {
                     species: self.particles.species[index],
                     position: record.position,
                     radius: record.radius,
-                    orientation: self.particles.state(index).orientation,
+                    semi_axes: self.particles.semi_axes(index),
+                    orientation: self.particles.orientation_of(index),
                     velocity: record.velocity,
                     angular_velocity: record.spin,
                     stress_trace: virial / volume,

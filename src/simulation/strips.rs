@@ -3,11 +3,10 @@
 use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::observe::{Observation, Observed, Wanted};
-use crate::force::pass::{Job, LineRing, PairPass, PassInput};
+use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
 use crate::integrate::gather::Lines;
 use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
-use crate::state::particles::Record;
 use std::ops::Range;
 
 /// Output lines: those kept for the step and one ring per strip.
@@ -99,7 +98,7 @@ impl Phase<'_> {
         run: &Run,
         first_section: usize,
         sections: &mut [Section],
-        records: &[Record],
+        bodies: BodyData,
         lines: LineRing,
         touches: &mut [BlockTouches; BATCH],
     ) -> Option<PassFault> {
@@ -109,7 +108,7 @@ impl Phase<'_> {
         let section = &mut sections[run.section as usize - first_section];
         let blocks = run.block as usize..(run.block + run.blocks) as usize;
         let excess =
-            self.passes[section.pair].run(Job { input: &self.input, records, section, blocks, lines, touches });
+            self.passes[section.pair].run(Job { input: &self.input, bodies, section, blocks, lines, touches });
         excess.map(|(place, overlap_ratio)| PassFault { section: run.section as usize, place, overlap_ratio })
     }
 
@@ -118,14 +117,14 @@ impl Phase<'_> {
         &self,
         list: &mut ContactList,
         partners: &[Partners],
-        records: &[Record],
+        bodies: BodyData,
         lines: &mut LineBuffers,
     ) -> Option<PassFault> {
         let ContactList { strips, sections, runs, pairs, kept, .. } = list;
         let values = &mut bytemuck::cast_slice_mut(&mut lines.kept)[..*kept * lines.stride];
         let (low, high) = (partners[0] as usize - 1, partners[partners.len() - 1] as usize);
         let work = Work { strips, sections, first_section: 0 };
-        self.kept_strips(work, &mut lines.rings, runs, low * *pairs..high * *pairs, 3 * *pairs, records, values)
+        self.kept_strips(work, &mut lines.rings, runs, low * *pairs..high * *pairs, 3 * *pairs, bodies, values)
     }
 
     fn kept_strips(
@@ -135,7 +134,7 @@ impl Phase<'_> {
         runs: &[Run],
         wanted: Range<usize>,
         per_strip: usize,
-        records: &[Record],
+        bodies: BodyData,
         lines: &mut [f64],
     ) -> Option<PassFault> {
         let [strip] = work.strips else {
@@ -149,8 +148,8 @@ impl Phase<'_> {
             let (low_runs, high_runs) = runs.split_at(low.strips.len() * per_strip);
             let (low_rings, high_rings) = rings.split_at_mut(low.strips.len());
             let (a, b) = rayon::join(
-                || self.kept_strips(low, low_rings, low_runs, wanted.clone(), per_strip, records, low_lines),
-                || self.kept_strips(high, high_rings, high_runs, wanted.clone(), per_strip, records, high_lines),
+                || self.kept_strips(low, low_rings, low_runs, wanted.clone(), per_strip, bodies, low_lines),
+                || self.kept_strips(high, high_rings, high_runs, wanted.clone(), per_strip, bodies, high_lines),
             );
             return a.or(b);
         };
@@ -159,7 +158,7 @@ impl Phase<'_> {
             let first = run.line as usize - strip.kept.start;
             let ring = LineRing { values: &mut *lines, first, mask: usize::MAX };
             let touches = &mut rings[0].touches;
-            let found = self.evaluate(run, work.first_section, work.sections, records, ring, touches);
+            let found = self.evaluate(run, work.first_section, work.sections, bodies, ring, touches);
             fault = fault.or(found);
         }
         fault
@@ -222,7 +221,8 @@ impl Phase<'_> {
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
                 let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
-                let found = self.evaluate(run, work.first_section, work.sections, slice.record, lines, touches);
+                let bodies = BodyData { records: slice.record, shapes: slice.shape };
+                let found = self.evaluate(run, work.first_section, work.sections, bodies, lines, touches);
                 fault = fault.or(found);
             }
             let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
@@ -238,19 +238,19 @@ impl Phase<'_> {
     pub fn observe(
         &self,
         list: &ContactList,
-        records: &[Record],
+        bodies: BodyData,
         owned: usize,
         wanted: Wanted,
         forces: &mut [[f64; 4]],
     ) -> Observation {
-        self.observe_runs(&list.runs, list, records, owned, wanted, forces)
+        self.observe_runs(&list.runs, list, bodies, owned, wanted, forces)
     }
 
     fn observe_runs(
         &self,
         runs: &[Run],
         list: &ContactList,
-        records: &[Record],
+        bodies: BodyData,
         owned: usize,
         wanted: Wanted,
         forces: &mut [[f64; 4]],
@@ -263,8 +263,8 @@ impl Phase<'_> {
             let cut = (high[0].line - first_line) as usize;
             let (low_forces, high_forces) = forces.split_at_mut(cut.min(forces.len()));
             let (mut a, b) = rayon::join(
-                || self.observe_runs(low, list, records, owned, wanted, low_forces),
-                || self.observe_runs(high, list, records, owned, wanted, high_forces),
+                || self.observe_runs(low, list, bodies, owned, wanted, low_forces),
+                || self.observe_runs(high, list, bodies, owned, wanted, high_forces),
             );
             a.merge(b);
             return a;
@@ -281,7 +281,7 @@ impl Phase<'_> {
             let section = &list.sections[run.section as usize];
             observed.line = run.line as usize;
             let blocks = run.block as usize..(run.block + run.blocks) as usize;
-            self.passes[section.pair].observe(&self.input, &records[section.origin..], section, blocks, &mut observed);
+            self.passes[section.pair].observe(&self.input, bodies.from(section.origin), section, blocks, &mut observed);
         }
         observed.observation
     }

@@ -1,6 +1,6 @@
 //! What this rank tells others per step, counted and expected.
 
-use super::{GHOSTS, Simulation};
+use super::Simulation;
 use crate::exchange::model::{HaloGeometry, Traffic};
 
 impl Simulation {
@@ -10,7 +10,7 @@ impl Simulation {
         Traffic {
             ghosts: self.halo.ghosts() as f64,
             messages: self.halo.messages() as f64,
-            bytes: self.halo.bytes(GHOSTS) as f64,
+            bytes: self.halo.bytes(self.model.ghosts()) as f64,
         }
     }
 
@@ -26,6 +26,6 @@ impl Simulation {
             margin: radius + self.model.max_radius + self.model.outer_skin(),
             particles,
         };
-        geometry.expected(GHOSTS.bytes() as f64)
+        geometry.expected(self.model.ghosts().bytes() as f64)
     }
 }

@@ -1,6 +1,7 @@
 //! What a particle and a contact are: the data that migration, checkpoint and digest carry.
 
 pub mod particles;
+pub mod shape;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,17 +15,21 @@ pub struct ParticleState {
     pub species: u32,
     /// Position, wrapped into the cell \[m\].
     pub position: [f64; 3],
-    /// Radius \[m\].
+    /// Radius of a sphere, largest semi-axis of an ellipsoid \[m\].
     pub radius: f64,
+    /// Semi-axes along the body's x, y, z \[m\]; the radius three times for a sphere.
+    pub semi_axes: [f64; 3],
     /// Velocity at the last half step \[m/s\].
     pub velocity: [f64; 3],
     /// Velocity at the full step, extrapolated with the last acceleration, W (2.3) \[m/s\].
     pub full_velocity: [f64; 3],
-    /// Angular velocity at the last half step \[rad/s\].
+    /// Angular velocity at the last half step \[rad/s\]. Of an ellipsoid: what the angular momentum of that
+    /// half step gives in the present orientation.
     pub spin: [f64; 3],
     /// Angular velocity at the full step \[rad/s\].
     pub full_spin: [f64; 3],
-    /// Orientation, unit quaternion (w, x, y, z); (1, 0, 0, 0) where orientations are not followed.
+    /// Orientation, unit quaternion (w, x, y, z); from body to space; (1, 0, 0, 0) where
+    /// orientations are not followed.
     pub orientation: [f64; 4],
     /// Energy ledger of this particle \[J\], see [`LEDGER`]; zero when the ledger is off.
     pub ledger: [f64; LEDGER.len()],
@@ -135,4 +140,22 @@ pub struct GlobalState {
     pub measured_stress: [f64; 3],
     /// Number of particles.
     pub particles: u64,
+    /// Progress of the quasi-static routine; absent until a quasi-static stage begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quasi_static: Option<QuasiStaticState>,
+}
+
+/// Where the quasi-static routine is.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct QuasiStaticState {
+    /// Increments that have reached equilibrium since the start of the run.
+    pub increments: u64,
+    /// Increments when the current stage began.
+    pub stage_start_increments: u64,
+    /// Substeps of the running increment; 0: its strain is not applied yet.
+    pub substep: u64,
+    /// Present mixing of velocities and forces (FIRE).
+    pub mixing: f64,
+    /// Substeps since the last uphill motion (FIRE).
+    pub downhill: u64,
 }

@@ -1,5 +1,6 @@
 //! Particles of one rank as a structure of arrays: owned first, then ghosts.
 
+use super::shape::{Shape, UPRIGHT, ellipsoid_mass};
 use super::{LEDGER, ParticleState};
 use bytemuck::{Pod, Zeroable};
 
@@ -10,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 pub struct Record {
     /// Wrapped position \[m\].
     pub position: [f64; 3],
-    /// Radius \[m\].
+    /// Radius; of an ellipsoid that of the sphere around it, its largest semi-axis \[m\].
     pub radius: f64,
     /// Velocity at the full step \[m/s\] (BCT: peculiar, BC: absolute).
     pub velocity: [f64; 3],
@@ -18,7 +19,8 @@ pub struct Record {
     pub inverse_mass: f64,
     /// Angular velocity at the full step \[rad/s\].
     pub spin: [f64; 3],
-    /// 1/I, I = 2/5 m R² \[1/(kg m²)\]; 0 for driven particles.
+    /// 1/I, I = 2/5 m R² \[1/(kg m²)\]; 0 for driven particles, and for ellipsoids, whose inertia is no
+    /// single number.
     pub inverse_inertia: f64,
 }
 
@@ -42,13 +44,18 @@ pub struct Particles {
     pub species: Vec<u32>,
     /// Packed records (all).
     pub record: Vec<Record>,
+    /// There are ellipsoids, on this rank or another.
+    pub ellipsoids: bool,
+    /// Semi-axes and orientations (all); empty when every particle of all ranks is a sphere.
+    pub shape: Vec<Shape>,
     /// Periodic images crossed since the start (all).
     pub image: Vec<[i32; 3]>,
     /// Velocity at the last half step; the fourth number is 0.
     pub velocity: Vec<[f64; 4]>,
     /// Angular velocity at the last half step; the fourth number is 0.
     pub spin: Vec<[f64; 4]>,
-    /// Orientation, unit quaternion (w, x, y, z); empty where orientations are not followed.
+    /// Orientations of spheres, unit quaternions (w, x, y, z); empty where they are not followed, and
+    /// where `shape` holds them.
     pub orientation: Vec<[f64; 4]>,
     /// Energy ledger per particle; empty when the ledger is off.
     pub ledger: Vec<[f64; LEDGER.len()]>,
@@ -57,8 +64,10 @@ pub struct Particles {
 /// What of a particle is followed only on request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extras {
-    /// Orientations.
+    /// Orientations of spheres.
     pub orientation: bool,
+    /// Semi-axes and orientations: there are ellipsoids.
+    pub ellipsoids: bool,
     /// Energy ledger.
     pub ledger: bool,
 }
@@ -67,7 +76,7 @@ impl Particles {
     /// Owned particles from their states.
     #[must_use]
     pub fn from_states(states: &[ParticleState], species: &[SpeciesConstants], extras: Extras) -> Self {
-        let mut particles = Self { owned: states.len(), ..Self::default() };
+        let mut particles = Self { owned: states.len(), ellipsoids: extras.ellipsoids, ..Self::default() };
         for state in states {
             let constants = species[state.species as usize];
             particles.id.push(state.id);
@@ -75,13 +84,17 @@ impl Particles {
             particles.image.push(state.image);
             particles.velocity.push(padded(state.velocity));
             particles.spin.push(padded(state.spin));
-            if extras.orientation {
+            if extras.ellipsoids {
+                let (semi_axes, orientation) = (state.semi_axes, state.orientation);
+                particles.shape.push(Shape { semi_axes, reserved: 0.0, orientation });
+            } else if extras.orientation {
                 particles.orientation.push(state.orientation);
             }
             if extras.ledger {
                 particles.ledger.push(state.ledger);
             }
-            let mass = sphere_mass(state.radius, constants.density);
+            let mass = ellipsoid_mass(state.semi_axes, constants.density);
+            let turns_by_shape = constants.driven || extras.ellipsoids;
             particles.record.push(Record {
                 // Never −0: the contact pass counts on it.
                 position: state.position.map(|x| x + 0.0),
@@ -89,7 +102,7 @@ impl Particles {
                 velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
                 spin: state.full_spin,
-                inverse_inertia: if constants.driven { 0.0 } else { 2.5 / (mass * state.radius * state.radius) },
+                inverse_inertia: if turns_by_shape { 0.0 } else { 2.5 / (mass * state.radius * state.radius) },
             });
         }
         particles
@@ -104,15 +117,29 @@ impl Particles {
             species: self.species[index],
             position: record.position,
             radius: record.radius,
+            semi_axes: self.semi_axes(index),
             velocity: trimmed(self.velocity[index]),
             full_velocity: record.velocity,
             spin: trimmed(self.spin[index]),
             full_spin: record.spin,
-            orientation: self.orientation.get(index).copied().unwrap_or([1.0, 0.0, 0.0, 0.0]),
+            orientation: self.orientation_of(index),
             ledger: self.ledger.get(index).copied().unwrap_or_default(),
             image: self.image[index],
             reserved: 0,
         }
+    }
+
+    /// Semi-axes of a particle \[m\].
+    #[must_use]
+    pub fn semi_axes(&self, index: usize) -> [f64; 3] {
+        self.shape.get(index).map_or([self.record[index].radius; 3], |shape| shape.semi_axes)
+    }
+
+    /// Orientation of an owned particle.
+    #[must_use]
+    pub fn orientation_of(&self, index: usize) -> [f64; 4] {
+        let of_sphere = || self.orientation.get(index).copied().unwrap_or(UPRIGHT);
+        self.shape.get(index).map_or_else(of_sphere, |shape| shape.orientation)
     }
 
     /// States of all owned particles, in local order.
@@ -144,6 +171,7 @@ impl Particles {
         permute(&mut self.id, order);
         permute(&mut self.species, order);
         permute(&mut self.record, order);
+        permute(&mut self.shape, order);
         permute(&mut self.image, order);
         permute(&mut self.velocity, order);
         permute(&mut self.spin, order);
@@ -156,6 +184,7 @@ impl Particles {
         self.id.truncate(self.owned);
         self.species.truncate(self.owned);
         self.record.truncate(self.owned);
+        self.shape.truncate(self.owned);
         self.image.truncate(self.owned);
     }
 }

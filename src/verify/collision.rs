@@ -75,8 +75,13 @@ pub fn sections(laws: &str, duration: f64) -> String {
 
 const ELASTIC: &str = "[contact.normal.hertz]\ndamping = \"none\"\n";
 
-/// Two spheres at ± `speed` along x, a hair apart.
+/// Two spheres at ± `speed` along x, a hair apart; `laws` and the time for a contact of this duration.
 fn head_on(radius: f64, speed: f64, material: &str, laws: &str, duration: f64) -> Scene {
+    head_on_with(radius, speed, material, sections(laws, duration))
+}
+
+/// Two spheres at ± `speed` along x, a hair apart, and all other sections of the input.
+pub fn head_on_with(radius: f64, speed: f64, material: &str, sections: String) -> Scene {
     let gap = radius * (1.0 + 1e-9);
     let sphere = |sign: f64| Sphere {
         position: [4.0 * radius - sign * gap, 4.0 * radius, 4.0 * radius],
@@ -87,7 +92,7 @@ fn head_on(radius: f64, speed: f64, material: &str, laws: &str, duration: f64) -
     Scene {
         sides: [8.0 * radius; 3],
         material: material.to_owned(),
-        sections: sections(laws, duration),
+        sections,
         spheres: vec![sphere(1.0), sphere(-1.0)],
         ..Scene::default()
     }

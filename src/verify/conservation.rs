@@ -29,6 +29,7 @@ fn gas_scene(time_step: f64, restitution: f64, friction: f64) -> Scene {
             radius: if k % 2 == 0 { GAS_RADIUS } else { 0.8 * GAS_RADIUS },
             velocity: [number(0), number(1), number(2)],
             spin: [3, 4, 5].map(|component| 300.0 * number(component)),
+            ..Sphere::default()
         }
     });
     Scene {

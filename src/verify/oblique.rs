@@ -86,6 +86,7 @@ fn spinning_on_wall() -> Result<Vec<Claim>> {
         radius: RADIUS,
         velocity: [0.0, 0.0, -speed],
         spin: [0.0, spin, 0.0],
+        ..Sphere::default()
     };
     let after = scene("none", impact.duration(), true, vec![sphere]).run()?[0];
     let gained = 2.0 * FRICTION * speed;

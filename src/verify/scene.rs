@@ -6,6 +6,7 @@ use crate::exchange::Communicator;
 use crate::force::observe::Wanted;
 use crate::setup;
 use crate::simulation::{Report, Requests, Simulation};
+use crate::state::shape::bounding_radius;
 use crate::state::{GlobalState, ParticleState};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -23,6 +24,16 @@ pub struct Sphere {
     pub velocity: [f64; 3],
     /// Initial angular velocity \[rad/s\].
     pub spin: [f64; 3],
+    /// Semi-axes \[m\] and orientation of an ellipsoid; its radius is the largest semi-axis.
+    pub ellipsoid: Option<([f64; 3], [f64; 4])>,
+}
+
+impl Sphere {
+    /// An ellipsoid in its place.
+    #[must_use]
+    pub fn with_semi_axes(self, semi_axes: [f64; 3], orientation: [f64; 4]) -> Self {
+        Self { radius: bounding_radius(semi_axes), ellipsoid: Some((semi_axes, orientation)), ..self }
+    }
 }
 
 /// What happens to spheres of one material (by the name `material`).
@@ -84,7 +95,13 @@ impl Scene {
         let input = folder.path.join("case.toml");
         let config = Arc::new(Config::parse(&self.input(), &input, &[], Some(&folder.path), Some(1))?);
         let comm = Communicator::single();
-        let initial = setup::from_packing(&comm, &config)?;
+        let mut initial = setup::from_packing(&comm, &config)?;
+        for particle in &mut initial.particles {
+            if let Some((semi_axes, orientation)) = self.spheres[particle.id as usize].ellipsoid {
+                particle.semi_axes = semi_axes;
+                particle.orientation = orientation;
+            }
+        }
         let decomposition = setup::decomposition(&comm, &config, &initial.global)?;
         setup::simulation(comm, &config, decomposition, initial, 1)
     }

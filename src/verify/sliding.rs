@@ -32,6 +32,7 @@ fn scene(velocity: f64, spin: f64, rolling_friction: f64, duration: f64) -> Scen
         radius: RADIUS,
         velocity: [velocity, 0.0, 0.0],
         spin: [0.0, spin, 0.0],
+        ..Sphere::default()
     };
     let rolling = if rolling_friction > 0.0 { "[contact.rolling.spring_slider]\n" } else { "" };
     let material = format!(

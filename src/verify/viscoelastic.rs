@@ -12,15 +12,15 @@ use crate::error::{Error, Result};
 use crate::force::observe::Wanted;
 use std::fmt::Write as _;
 
-const RATES: &str = include_str!("../../tests/data/maxwell_zener_rates.csv");
-const RELAXATION: &str = include_str!("../../tests/data/maxwell_zener_relaxation.csv");
+pub const RATES: &str = include_str!("../../tests/data/maxwell_zener_rates.csv");
+pub const RELAXATION: &str = include_str!("../../tests/data/maxwell_zener_relaxation.csv");
 
 const RADIUS: f64 = 5e-6;
 /// The bound that the law must keep at the automatic time step.
 const SHARE: f64 = 1e-3;
 
 /// Rows of numbers below the header.
-fn rows(csv: &str) -> Result<Vec<Vec<f64>>> {
+pub fn rows(csv: &str) -> Result<Vec<Vec<f64>>> {
     let row = |line: &str| {
         line.split(',').map(|field| field.trim().parse::<f64>()).collect::<std::result::Result<Vec<_>, _>>()
     };

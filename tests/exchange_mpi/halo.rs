@@ -34,7 +34,8 @@ fn check_scene(comm: &Communicator, scene: &Scene, decomposition: &Decomposition
     check_update(comm, scene, &mut plan, &mut particles, 2, false, &place);
 }
 
-/// Ghosts are as their owners have them: positions of `time`, velocities of `velocity_time`.
+/// Ghosts are as their owners have them: positions of `time`, velocities and orientations of
+/// `velocity_time`.
 fn check_ghosts(scene: &Scene, particles: &Particles, time: u64, velocity_time: u64, place: &str) {
     for ghost in particles.owned..particles.len() {
         let id = particles.id[ghost];
@@ -44,6 +45,7 @@ fn check_ghosts(scene: &Scene, particles: &Particles, time: u64, velocity_time: 
         expected.velocity = before.record[0].velocity;
         expected.spin = before.record[0].spin;
         assert_eq!(particles.record[ghost], expected, "{place}");
+        assert_eq!(particles.shape[ghost], before.shape[0], "{place}");
         assert_eq!((particles.species[ghost], particles.image[ghost]), (now.species[0], now.image[0]), "{place}");
     }
 }
@@ -100,6 +102,7 @@ fn check_update(
         let moved = Particles::from_states(&[state], &SPECIES, ALL);
         particles.record[own] = moved.record[0];
         particles.image[own] = moved.image[0];
+        particles.shape[own] = moved.shape[0];
     }
     let expected: BTreeSet<(u32, [i32; 3])> = (particles.owned..particles.len())
         .map(|ghost| {
@@ -109,7 +112,7 @@ fn check_update(
         .filter(|(_, change)| *change != [0; 3])
         .collect();
     let mut wrapped = vec![(7, [7; 3])];
-    let content = HaloContent { velocities };
+    let content = HaloContent { velocities, orientations: velocities };
     let seen = plan.update(comm, particles, content, &mut wrapped, |particles| particles.len());
     assert_eq!(seen, particles.len());
     assert_eq!(wrapped.into_iter().collect::<BTreeSet<_>>(), expected, "{place}");

@@ -6,7 +6,7 @@ use dem_mpi::state::particles::{Extras, SpeciesConstants};
 
 pub const SPECIES: [SpeciesConstants; 2] =
     [SpeciesConstants { density: 1000.0, driven: false }, SpeciesConstants { density: 2500.0, driven: true }];
-pub const ALL: Extras = Extras { orientation: true, ledger: true };
+pub const ALL: Extras = Extras { orientation: false, ellipsoids: true, ledger: true };
 
 /// A number in 0 … 1 that depends on its keys alone.
 pub fn random(keys: [u64; 3]) -> f64 {
@@ -43,11 +43,13 @@ impl Scene {
                 (draw(k as u64) * 1.1 - 0.05) * self.sides[k]
             }
         });
+        let radius = self.max_radius * (0.5 + 0.5 * random([u64::from(id), 0, 99]));
         ParticleState {
             id,
             species: id % 2,
             position,
-            radius: self.max_radius * (0.5 + 0.5 * random([u64::from(id), 0, 99])),
+            radius,
+            semi_axes: [radius, radius * random([u64::from(id), 0, 98]), radius * random([u64::from(id), 0, 97])],
             velocity: vector(10),
             full_velocity: vector(20),
             spin: vector(30),

@@ -14,7 +14,7 @@ const STEPS: usize = 4;
 fn branches(count: usize) -> PairProperties {
     let branches =
         (0..count).map(|k| MaxwellBranch { modulus: 1e8 * (1 + k) as f64, relaxation_time: 1e-3 * (1 + k) as f64 });
-    properties(1e9, 0.3, branches.collect())
+    PairProperties { yield_stress: [Some(1e6); 2], ..properties(1e9, 0.3, branches.collect()) }
 }
 
 fn with_branches(count: usize) -> PairConfig {
@@ -30,14 +30,21 @@ fn every_normal() -> impl Iterator<Item = PairConfig> {
     })
 }
 
-/// Every combination of a law's choices and flags.
+/// Every combination of a law's choices and flags, and each number alone at its least value.
 fn variants(law: LawChoice) -> Vec<LawChoice> {
+    let numbers = law.law.parameters.iter().enumerate().filter_map(|(k, spec)| {
+        let ParameterKind::Number { min, .. } = spec.kind else { return None };
+        let mut law = law.clone();
+        law.values[k] = ParameterValue::Number(min);
+        Some(law)
+    });
+    let numbers: Vec<LawChoice> = numbers.collect();
     let mut all = vec![law];
     for (k, spec) in all[0].law.parameters.iter().enumerate() {
         let values: Vec<ParameterValue> = match spec.kind {
             ParameterKind::Choice(words) => (0..words.len()).map(ParameterValue::Choice).collect(),
             ParameterKind::Flag => [true, false].map(ParameterValue::Flag).to_vec(),
-            ParameterKind::Number { min, .. } => vec![spec.default, ParameterValue::Number(min)],
+            ParameterKind::Number { .. } => vec![spec.default],
         };
         all = all
             .iter()
@@ -50,6 +57,7 @@ fn variants(law: LawChoice) -> Vec<LawChoice> {
             })
             .collect();
     }
+    all.extend(numbers);
     all
 }
 
@@ -87,6 +95,9 @@ fn touch(n: &[f64; 15]) -> Touch<f64> {
         overlap: 1e-6 * (n[0].abs() + 1e-3),
         overlap_rate: n[1],
         effective_radius: 1e-3 * (n[14].abs() + 0.1),
+        radius_factor: 1.0 - 0.1 * n[13].abs(),
+        overlap_factor: 1.0 - 0.1 * n[12].abs(),
+        size: 4e-3 * (n[14].abs() + 0.1),
         effective_mass: 1e-6 * (n[13].abs() + 0.1),
         normal,
         slip_velocity: std::array::from_fn(|k| slip[k] - along * normal[k]),
@@ -102,6 +113,9 @@ fn gather(touches: &[Touch<f64>]) -> Touch<Portable8> {
         overlap: lanes(&|t| t.overlap),
         overlap_rate: lanes(&|t| t.overlap_rate),
         effective_radius: lanes(&|t| t.effective_radius),
+        radius_factor: lanes(&|t| t.radius_factor),
+        overlap_factor: lanes(&|t| t.overlap_factor),
+        size: lanes(&|t| t.size),
         effective_mass: lanes(&|t| t.effective_mass),
         normal: vector(&|t| t.normal),
         slip_velocity: vector(&|t| t.slip_velocity),

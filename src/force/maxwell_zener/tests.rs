@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::config::MaxwellBranch;
-use crate::force::testing::{accumulate, choice, impact, pair, properties, pvdf, sum, touch};
+use crate::force::testing::{accumulate, choice, impact, pair, properties, pvdf, sum, table, touch};
 
 /// Two spheres of 5 µm, as in W Figs. 9 and 10.
 const RADIUS: f64 = 2.5e-6;
@@ -38,11 +38,6 @@ fn follow<const B: usize>(
     law.prepare(step);
     let mut memory = vec![0.0; B + 1];
     (1..=steps).map(|k| law.evaluate(&touch(path(k as f64 * step), 0.0, RADIUS, 1e-12), &mut memory).force).collect()
-}
-
-/// Rows of a CSV file below its header.
-fn table(text: &str) -> Vec<Vec<f64>> {
-    text.lines().skip(1).map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect()
 }
 
 fn relative(got: f64, expected: f64) -> f64 {
@@ -227,4 +222,28 @@ fn unequal_materials_and_missing_branches_are_refused_with_a_remedy() {
     assert!(check(&properties(1e9, 0.3, Vec::new())).unwrap_err().contains("at least one Maxwell branch"));
     let nine = vec![MaxwellBranch { modulus: 1e8, relaxation_time: 1.0 }; 9];
     assert!(check(&properties(1e9, 0.3, nine)).unwrap_err().contains("at most 8"));
+}
+
+#[test]
+fn between_ellipsoids_fast_and_slow_loading_are_hertz_with_the_elliptical_geometry() {
+    let (f1, f2) = (0.98, 0.95);
+    let hertz = |modulus: f64, overlap: f64| hertz(modulus, overlap / f2);
+    let end = |duration: f64, steps: usize| {
+        let mut law = exact();
+        let step = duration / steps as f64;
+        law.prepare(step);
+        let mut memory = [0.0; 2];
+        let mut response = None;
+        for k in 1..=steps {
+            let overlap = TOP * k as f64 / steps as f64;
+            let touch = Touch { radius_factor: f1, overlap_factor: f2, ..touch(overlap, 0.0, RADIUS, 1e-12) };
+            response = Some(law.evaluate(&touch, &mut memory));
+        }
+        response.unwrap()
+    };
+    let fast = end(1e-6, 1000);
+    assert!(relative(fast.force, hertz(1365.9e6 + 404.6e6, TOP)) < 1e-5, "{}", fast.force);
+    assert!(relative(fast.contact_radius, f1 * (RADIUS * TOP / f2).sqrt()) < 1e-14);
+    let slow = end(1e5, 100_000);
+    assert!(relative(slow.force, hertz(1365.9e6, TOP)) < 1e-4, "{}", slow.force);
 }

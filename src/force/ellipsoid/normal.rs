@@ -1,0 +1,241 @@
+//! The common normal of two ellipsoids: the unit vector n that minimises the overlap along it.
+
+use super::{Symmetric, radii_tensor, support, tangents};
+use crate::force::lane::{Lane, Vector, add, dot, scale, sub};
+
+/// Most iterations of one start. Two to four are usual; the pairs of the tests need at most about thirty.
+pub const MAX_ITERATIONS: usize = 100;
+
+/// A step \[rad\] below which Newton's quadratic convergence leaves nothing to gain.
+const LAST_STEP: f64 = 1e-7;
+
+/// Longest step \[rad\].
+const LONGEST_STEP: f64 = 0.5;
+
+/// Shortest step \[rad\] along a direction in which the overlap has a maximum.
+const KICK: f64 = 0.05;
+
+/// Two ellipsoids: tensors \[m²\] and the branch vector d from the first's centre to the second's \[m\].
+#[derive(Debug, Clone, Copy)]
+pub struct Ellipsoids<L> {
+    /// M of both.
+    pub tensors: [Symmetric<L>; 2],
+    /// d.
+    pub branch: Vector<L>,
+}
+
+/// What is known at one direction.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<L> {
+    /// Unit normal n from the first to the second.
+    pub normal: Vector<L>,
+    /// Overlap along n \[m\]; at the minimum the overlap δ of the pair, negative for a gap.
+    pub overlap: L,
+    /// Point of the first's surface whose outer normal is n, from the first's centre \[m\].
+    pub first_point: Vector<L>,
+    /// Point of the second's surface whose outer normal is −n, from the second's centre \[m\].
+    pub second_point: Vector<L>,
+    /// Tangents at n.
+    pub tangents: [Vector<L>; 2],
+    /// Radii tensors W of both at n: 11, 22, 12 in the tangents \[m\].
+    pub radii: [[L; 3]; 2],
+}
+
+/// Where a search ended.
+#[derive(Debug, Clone, Copy)]
+pub struct Search<L: Lane> {
+    /// The last direction.
+    pub found: Found<L>,
+    /// Lanes that neither converged nor fell below the bound.
+    pub failed: L::Mask,
+    /// Evaluations of the longest lane.
+    pub evaluations: usize,
+}
+
+impl<L: Lane> Ellipsoids<L> {
+    /// Overlap `o(n) = h_i(n) + h_j(n) − n·d` with its surface points and curvatures.
+    #[inline(always)]
+    #[must_use]
+    pub fn along(&self, normal: Vector<L>) -> Found<L> {
+        let [a, b] = &self.tensors;
+        let (first_distance, first_point) = support(a, normal);
+        let (second_distance, opposite) = support(b, normal);
+        let tangents = tangents(normal);
+        Found {
+            normal,
+            overlap: first_distance + second_distance - dot(normal, self.branch),
+            first_point,
+            second_point: opposite.map(|c| -c),
+            tangents,
+            radii: [
+                radii_tensor(a, first_distance, first_point, &tangents),
+                radii_tensor(b, second_distance, opposite, &tangents),
+            ],
+        }
+    }
+
+    /// Minimise o(n) over the unit sphere from `start`, by Newton's method on the sphere with the Hessian
+    /// `W_i + W_j − o I`; in each of its two principal directions the step is `−g/(|λ| + μ)`, so that it goes down also
+    /// where the curvature λ is negative. μ grows where the overlap did not fall and shrinks where it did.
+    ///
+    /// A lane stops when it has converged or when its overlap is at most `bound` (then n separates the bodies by
+    /// as much), and moves no more.
+    ///
+    /// # Source
+    /// PHYSICS.md "Ellipsoid geometry"; saddle-free Newton steps as in Dauphin et al. 2014 (arXiv:1406.2572).
+    #[inline(always)]
+    #[must_use]
+    pub fn search(&self, start: Vector<L>, bound: L) -> Search<L> {
+        let zero = L::splat(0.0);
+        let mut now = self.along(start);
+        let mut damping = zero;
+        // NaN never converges but must end the search.
+        let mut active = now.overlap.greater(bound);
+        let mut evaluations = 1;
+        while L::any(active) && evaluations < MAX_ITERATIONS {
+            let step = Step::new(&now, self.branch, damping);
+            let turned =
+                add(now.normal, add(scale(now.tangents[0], step.along[0]), scale(now.tangents[1], step.along[1])));
+            let next = self.along(scale(turned, L::splat(1.0) / dot(turned, turned).sqrt()));
+            evaluations += 1;
+            let small = L::splat(LAST_STEP * LAST_STEP).at_least(step.square);
+            let falls = (now.overlap - L::splat(1e-4) * step.gain).at_least(next.overlap);
+            // Below rounding the overlap can no longer tell; the gradient can.
+            let accepted = falls | (small & step.convex);
+            let converged = small & step.convex;
+            let grown = damping * L::splat(4.0) + L::splat(0.1) * step.stiffness;
+            let shrunk = damping * L::splat(0.1);
+            let negligible = (L::splat(1e-3) * step.stiffness).greater(shrunk);
+            let kept = L::select(accepted, L::select(negligible, zero, shrunk), grown);
+            damping = L::select(active, kept, damping);
+            now = Found::select(active & accepted, &next, &now);
+            active = active & !converged & now.overlap.greater(bound);
+        }
+        Search { found: now, failed: active, evaluations }
+    }
+}
+
+impl<L: Lane> Ellipsoids<L> {
+    /// The common normal of a pair: from the `stored` normal of its last touch where there is one (not the zero
+    /// vector), else from the cold starts d/|d| and `(M_i + M_j)⁻¹ d`, of which the lower overlap counts: deep
+    /// overlaps have several minima. Overlaps of at most `bound` \[m\] are not pursued.
+    #[inline(always)]
+    #[must_use]
+    pub fn common_normal(&self, stored: Vector<L>, bound: L) -> Search<L> {
+        let warm = dot(stored, stored).greater(L::splat(0.5));
+        let straight = unit(self.branch);
+        let start = [0, 1, 2].map(|k| L::select(warm, stored[k], straight[k]));
+        let mut first = self.search(start, bound);
+        let again = !warm & first.found.overlap.greater(bound);
+        if L::any(again) {
+            // Lanes that need no second start are below this bound from the outset.
+            let second = self.search(self.pulled_back(), L::select(again, bound, L::splat(f64::INFINITY)));
+            let lower = again & first.found.overlap.greater(second.found.overlap);
+            first.found = Found::select(lower, &second.found, &first.found);
+            first.failed = (first.failed & !lower) | (second.failed & lower);
+            first.evaluations += second.evaluations;
+        }
+        first
+    }
+
+    /// `(M_i + M_j)⁻¹ d` as a unit vector: the normal of an ellipsoid of the summed tensors in the direction d.
+    #[inline(always)]
+    fn pulled_back(&self) -> Vector<L> {
+        let [a, b] = &self.tensors;
+        let m: Symmetric<L> = std::array::from_fn(|k| a[k] + b[k]);
+        let [xx, yy, zz, xy, xz, yz] = m;
+        let adjugate = [
+            yy * zz - yz * yz,
+            xx * zz - xz * xz,
+            xx * yy - xy * xy,
+            xz * yz - xy * zz,
+            xy * yz - xz * yy,
+            xy * xz - xx * yz,
+        ];
+        unit(super::apply(&adjugate, self.branch))
+    }
+}
+
+#[inline(always)]
+fn unit<L: Lane>(v: Vector<L>) -> Vector<L> {
+    scale(v, L::splat(1.0) / dot(v, v).sqrt())
+}
+
+/// A step on the tangent plane.
+struct Step<L: Lane> {
+    along: [L; 2],
+    /// Squared length.
+    square: L,
+    /// Fall of the overlap that the gradient promises, ≥ 0.
+    gain: L,
+    /// Both curvatures are positive and undamped.
+    convex: L::Mask,
+    /// Larger curvature.
+    stiffness: L,
+}
+
+impl<L: Lane> Step<L> {
+    #[inline(always)]
+    fn new(now: &Found<L>, branch: Vector<L>, damping: L) -> Self {
+        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
+        let rest = sub(sub(now.first_point, now.second_point), branch);
+        let gradient = [dot(now.tangents[0], rest), dot(now.tangents[1], rest)];
+        let [wi, wj] = &now.radii;
+        let (h11, h22, h12) = (wi[0] + wj[0] - now.overlap, wi[1] + wj[1] - now.overlap, wi[2] + wj[2]);
+        // Principal directions: of the two formulas for the same vector the longer one.
+        let (mean, difference) = (half * (h11 + h22), half * (h11 - h22));
+        let radius = (difference * difference + h12 * h12).sqrt();
+        let leans = difference.less(zero);
+        let long = L::select(leans, radius - difference, radius + difference);
+        let raw = [L::select(leans, h12, long), L::select(leans, long, h12)];
+        let square = dot([raw[0], raw[1], zero], [raw[0], raw[1], zero]);
+        let inverse = one / square.sqrt();
+        let round = !square.greater(zero);
+        let stiff = [L::select(round, one, raw[0] * inverse), L::select(round, zero, raw[1] * inverse)];
+        let soft = [-stiff[1], stiff[0]];
+        let (high, low) = (mean + radius, mean - radius);
+        let magnitude = |x: L| x.max(-x);
+        let stiffness = magnitude(high).max(magnitude(low));
+        // A curvature of nearly nothing must not throw the step off the sphere.
+        let floor = L::splat(1e-9) * stiffness;
+        let component = |direction: [L; 2], curvature: L| {
+            let slope = direction[0] * gradient[0] + direction[1] * gradient[1];
+            let newton = -slope / (magnitude(curvature).max(floor) + damping);
+            // At a maximum the slope may be zero: leave it all the same, by less the more often it failed.
+            let kick = L::splat(KICK) * stiffness / (stiffness + L::splat(10.0) * damping);
+            let kicked = L::select(slope.greater(zero), newton.min(-kick), newton.max(kick));
+            (slope, L::select(curvature.less(zero), kicked, newton))
+        };
+        let ((soft_slope, soft_step), (stiff_slope, stiff_step)) = (component(soft, low), component(stiff, high));
+        let length = (soft_step * soft_step + stiff_step * stiff_step).sqrt();
+        let factor = one.min(L::splat(LONGEST_STEP) / length);
+        let (soft_step, stiff_step) = (soft_step * factor, stiff_step * factor);
+        Self {
+            along: [soft[0] * soft_step + stiff[0] * stiff_step, soft[1] * soft_step + stiff[1] * stiff_step],
+            square: soft_step * soft_step + stiff_step * stiff_step,
+            gain: -(soft_slope * soft_step + stiff_slope * stiff_step),
+            convex: low.greater(zero) & zero.at_least(damping),
+            stiffness,
+        }
+    }
+}
+
+impl<L: Lane> Found<L> {
+    /// Lane by lane `yes` or `no`.
+    #[inline(always)]
+    #[must_use]
+    pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        let choose = |a: L, b: L| L::select(mask, a, b);
+        fn zip<L: Lane, const N: usize>(a: [L; N], b: [L; N], f: impl Fn(L, L) -> L) -> [L; N] {
+            std::array::from_fn(|k| f(a[k], b[k]))
+        }
+        Self {
+            normal: zip(yes.normal, no.normal, choose),
+            overlap: choose(yes.overlap, no.overlap),
+            first_point: zip(yes.first_point, no.first_point, choose),
+            second_point: zip(yes.second_point, no.second_point, choose),
+            tangents: [0, 1].map(|k| zip(yes.tangents[k], no.tangents[k], choose)),
+            radii: [0, 1].map(|k| zip(yes.radii[k], no.radii[k], choose)),
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Touches of ellipsoids, a block at a time, from packed records and shapes. The block's numbers are laid down in
+//! between so that this code is compiled once per instruction set and not once per law.
+
+use super::curvature::Ellipse;
+use super::normal::{Ellipsoids, Found};
+use super::{radii_tensor, shape_tensor, support, tangents};
+use crate::contact::section::{BLOCK, Section};
+use crate::force::geometry::{Bodies, CellMotion, PairTouch, TOUCH_TOLERANCE, image};
+use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
+#[cfg(target_arch = "x86_64")]
+use crate::force::lane::{avx2::F64x4, avx512::F64x8};
+use crate::force::law::Touch;
+use crate::force::simd::Simd;
+use crate::state::particles::Record;
+use crate::state::shape::{Shape, smallest_semi_axis};
+
+/// A touch of ellipsoids with the arms of its contact point.
+#[derive(Clone, Copy)]
+pub struct EllipsoidTouch<L: Lane> {
+    /// As between spheres; `arm_first` and `arm_second` are the arms' parts along the normal.
+    pub pair: PairTouch<L>,
+    /// From the two centres to the contact point \[m\].
+    pub arms: [Vector<L>; 2],
+}
+
+/// What all touches of a pass share.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// Cell.
+    pub motion: &'a CellMotion,
+    /// Gap over the smallest semi-axis of a pair beyond which nothing more is asked of it.
+    pub range: f64,
+}
+
+/// Numbers of an [`EllipsoidTouch`].
+const NUMBERS: usize = 33;
+
+/// The touches of one block.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct TouchBlock([[f64; BLOCK]; NUMBERS]);
+
+impl TouchBlock {
+    /// The touches of a block of a section. `normals`: where in the section's memory columns the stored normal is.
+    #[must_use]
+    pub fn new(
+        simd: Simd,
+        surroundings: &Surroundings,
+        records: &[Record],
+        shapes: &[Shape],
+        section: &Section,
+        block: usize,
+        normals: usize,
+    ) -> Self {
+        let mut touches = Self([[0.0; BLOCK]; NUMBERS]);
+        let from = Source { surroundings, records, shapes, section, block, normals };
+        match simd {
+            // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx512 => unsafe { touches.fill_avx512(&from) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2 => unsafe { touches.fill_avx2(&from) },
+            _ => touches.fill::<f64>(&from),
+        }
+        touches
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn fill_avx2(&mut self, from: &Source) {
+        self.fill::<F64x4>(from);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    fn fill_avx512(&mut self, from: &Source) {
+        self.fill::<F64x8>(from);
+    }
+
+    #[inline(always)]
+    fn fill<L: Lane>(&mut self, from: &Source) {
+        for lane in (0..BLOCK).step_by(L::WIDTH) {
+            let numbers = from.touch::<L>(lane).numbers();
+            for (column, number) in self.0.iter_mut().zip(numbers) {
+                number.store(&mut column[lane..]);
+            }
+        }
+    }
+
+    /// The touches from a lane on.
+    #[inline(always)]
+    #[must_use]
+    pub fn load<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
+        EllipsoidTouch::from_numbers(std::array::from_fn(|k| L::load(&self.0[k][lane..])))
+    }
+}
+
+/// Where the touches of a block come from.
+struct Source<'a> {
+    surroundings: &'a Surroundings<'a>,
+    records: &'a [Record],
+    shapes: &'a [Shape],
+    section: &'a Section,
+    block: usize,
+    normals: usize,
+}
+
+impl Source<'_> {
+    #[inline(always)]
+    fn touch<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
+        let place = self.block * BLOCK + lane;
+        let lanes = place..place + L::WIDTH;
+        let (first, second) = (&self.section.first[lanes.clone()], &self.section.second[lanes.clone()]);
+        let a = Bodies::<L>::gather(self.records, first);
+        let b = Bodies::<L>::gather(self.records, second);
+        let shape_a = gather_shapes(self.shapes, first);
+        let shape_b = gather_shapes(self.shapes, second);
+        let memory = self.block * self.section.columns + self.normals;
+        let stored = [0, 1, 2].map(|k| L::load(&self.section.memory[memory + k].0[lane..]));
+        ellipsoids([&a, &b], [&shape_a, &shape_b], stored, &self.section.shift[lanes], self.surroundings)
+    }
+}
+
+/// Semi-axes and orientations of some particles, transposed.
+#[derive(Debug, Clone, Copy)]
+pub struct Shapes<L> {
+    /// Semi-axes \[m\].
+    pub semi_axes: Vector<L>,
+    /// Unit quaternions.
+    pub orientation: [L; 4],
+}
+
+#[inline(always)]
+fn gather_shapes<L: Lane>(shapes: &[Shape], index: &[u32]) -> Shapes<L> {
+    let mut columns = [[0.0; BLOCK]; 7];
+    for (lane, index) in index.iter().enumerate() {
+        let shape = &shapes[*index as usize];
+        for (column, number) in columns.iter_mut().zip(shape.semi_axes.iter().chain(&shape.orientation)) {
+            column[lane] = *number;
+        }
+    }
+    let lanes = columns.map(|column| L::load(&column));
+    Shapes { semi_axes: [lanes[0], lanes[1], lanes[2]], orientation: [lanes[3], lanes[4], lanes[5], lanes[6]] }
+}
+
+impl<L: Lane> Shapes<L> {
+    #[inline(always)]
+    fn smallest(&self) -> L {
+        self.semi_axes[0].min(self.semi_axes[1]).min(self.semi_axes[2])
+    }
+
+    /// r̂, the radius of the sphere of equal volume \[m\].
+    #[inline(always)]
+    fn mean_radius(&self) -> L {
+        (self.semi_axes[0] * self.semi_axes[1] * self.semi_axes[2]).map(libm::cbrt)
+    }
+}
+
+/// Touch of two ellipsoids, the second in the image of its packed shift, warm from the `stored` normal. The contact
+/// point is the midpoint of the two surface points. δ̇ and the slip velocity are those of the material points there;
+/// m_eff is that of the centres. NaN counts as touching, so that it is found.
+///
+/// # Source
+/// PHYSICS.md "Ellipsoid geometry" and section 1.
+#[inline(always)]
+#[must_use]
+pub fn ellipsoids<L: Lane>(
+    [a, b]: [&Bodies<L>; 2],
+    shapes: [&Shapes<L>; 2],
+    stored: Vector<L>,
+    codes: &[u16],
+    surroundings: &Surroundings,
+) -> EllipsoidTouch<L> {
+    let motion = surroundings.motion;
+    let branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
+    let min_radius = shapes[0].smallest().min(shapes[1].smallest());
+    let tensors = shapes.map(|shape| shape_tensor(shape.semi_axes, shape.orientation));
+    let bound = L::splat(-surroundings.range) * min_radius;
+    let found: Found<L> = Ellipsoids { tensors, branch }.common_normal(stored, bound).found;
+    let (normal, overlap) = (found.normal, found.overlap);
+    let heights = dot(normal, sub(found.first_point, found.second_point));
+    let ellipse = Ellipse::new(&found.radii);
+
+    let [gx, gy, gz] = motion.gradient;
+    let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
+    let imposed_velocity = add(image(&motion.shift_velocity, codes), affine);
+    let half = L::splat(0.5);
+    let arm = scale(add(add(found.first_point, branch), found.second_point), half);
+    let arms = [arm, sub(arm, branch)];
+    let turning = sub(cross(b.spin, arms[1]), cross(a.spin, arms[0]));
+    let velocity = add(add(sub(b.velocity, a.velocity), imposed_velocity), turning);
+    let approach = dot(velocity, normal);
+    let touch = Touch {
+        overlap,
+        overlap_rate: -approach,
+        effective_radius: ellipse.effective_radius,
+        radius_factor: ellipse.radius_factor,
+        overlap_factor: ellipse.overlap_factor,
+        size: shapes[0].mean_radius() + shapes[1].mean_radius(),
+        effective_mass: L::splat(1.0) / (a.inverse_mass + b.inverse_mass),
+        normal,
+        slip_velocity: sub(velocity, scale(normal, approach)),
+        relative_spin: sub(b.spin, a.spin),
+        spin_about_normal: half * dot(add(a.spin, b.spin), normal),
+    };
+    let pair = PairTouch {
+        touching: !(L::splat(TOUCH_TOLERANCE) * heights).at_least(overlap),
+        touch,
+        branch,
+        imposed_velocity,
+        arm_first: dot(arms[0], normal),
+        arm_second: -dot(arms[1], normal),
+        min_radius,
+    };
+    EllipsoidTouch { pair, arms }
+}
+
+/// Touch of an ellipsoid and a plane wall (2·axis + side); the contact point lies in the wall.
+#[must_use]
+pub fn wall(a: &Record, shape: &Shape, wall: u32, motion: &CellMotion) -> EllipsoidTouch<f64> {
+    // What of the wall does not depend on the shape.
+    let PairTouch { touch: plane, branch, imposed_velocity, arm_first: gap, .. } =
+        crate::force::geometry::wall(a, wall, motion);
+    let normal = plane.normal;
+    let tensor = shape_tensor(shape.semi_axes, shape.orientation);
+    let (height, point) = support(&tensor, normal);
+    let basis = tangents(normal);
+    let ellipse = Ellipse::before_plane(&radii_tensor(&tensor, height, point, &basis));
+    let overlap = height - gap;
+    let arm = sub(point, scale(normal, overlap));
+    let velocity = sub(sub(imposed_velocity, a.velocity), cross(a.spin, arm));
+    let approach = dot(velocity, normal);
+    let [x, y, z] = shape.semi_axes;
+    let touch = Touch {
+        overlap,
+        overlap_rate: -approach,
+        effective_radius: ellipse.effective_radius,
+        radius_factor: ellipse.radius_factor,
+        overlap_factor: ellipse.overlap_factor,
+        size: 2.0 * libm::cbrt(x * y * z),
+        slip_velocity: sub(velocity, scale(normal, approach)),
+        ..plane
+    };
+    let pair = PairTouch {
+        touching: !(TOUCH_TOLERANCE * height).at_least(overlap),
+        touch,
+        branch,
+        imposed_velocity,
+        arm_first: gap,
+        arm_second: 0.0,
+        min_radius: smallest_semi_axis(shape.semi_axes),
+    };
+    EllipsoidTouch { pair, arms: [arm, [0.0; 3]] }
+}
+
+impl<L: Lane> EllipsoidTouch<L> {
+    #[inline(always)]
+    fn numbers(&self) -> [L; NUMBERS] {
+        let PairTouch { touching, touch: t, branch, imposed_velocity: v, arm_first, arm_second, min_radius } =
+            self.pair;
+        let flag = L::select(touching, L::splat(1.0), L::splat(0.0));
+        let [r, s] = self.arms;
+        let (n, slip, spin) = (t.normal, t.slip_velocity, t.relative_spin);
+        #[rustfmt::skip]
+        let numbers = [
+            flag, t.overlap, t.overlap_rate, t.effective_radius, t.radius_factor, t.overlap_factor, t.size,
+            t.effective_mass, n[0], n[1], n[2], slip[0], slip[1], slip[2], spin[0], spin[1], spin[2],
+            t.spin_about_normal, branch[0], branch[1], branch[2], v[0], v[1], v[2],
+            arm_first, arm_second, min_radius, r[0], r[1], r[2], s[0], s[1], s[2],
+        ];
+        numbers
+    }
+
+    #[inline(always)]
+    fn from_numbers(x: [L; NUMBERS]) -> Self {
+        let vector = |k: usize| [x[k], x[k + 1], x[k + 2]];
+        let touch = Touch {
+            overlap: x[1],
+            overlap_rate: x[2],
+            effective_radius: x[3],
+            radius_factor: x[4],
+            overlap_factor: x[5],
+            size: x[6],
+            effective_mass: x[7],
+            normal: vector(8),
+            slip_velocity: vector(11),
+            relative_spin: vector(14),
+            spin_about_normal: x[17],
+        };
+        let pair = PairTouch {
+            touching: x[0].greater(L::splat(0.5)),
+            touch,
+            branch: vector(18),
+            imposed_velocity: vector(21),
+            arm_first: x[24],
+            arm_second: x[25],
+            min_radius: x[26],
+        };
+        Self { pair, arms: [vector(27), vector(30)] }
+    }
+}
