@@ -53,6 +53,7 @@ const UNSAFE_FILES: &[(&str, &str)] = &[
     ("src/force/lane/avx2.rs", "vector instructions"),
     ("src/force/lane/avx512.rs", "vector instructions"),
     ("src/force/pass.rs", "calls into code compiled for vector instructions"),
+    ("src/force/pass/spheres.rs", "calls into code compiled for vector instructions"),
     ("src/force/pass/ellipsoids.rs", "calls into code compiled for vector instructions"),
     ("src/force/ellipsoid/touch.rs", "calls into code compiled for vector instructions"),
     ("src/integrate/leap_frog.rs", "calls into code compiled for vector instructions"),

@@ -3,29 +3,30 @@
 
 use super::composition::{self, MAX_MEMORY};
 use super::geometry::{self, Bodies, CellMotion, PairTouch};
-use super::lane::{Lane, cross, dot, prefetch, scale, sub};
+use super::lane::{Lane, prefetch};
 #[cfg(target_arch = "x86_64")]
 use super::lane::{avx2::F64x4, avx512::F64x8};
-use super::law::{Column, ContactLaw, ContactResponse, LawVisitor, Touch};
+use super::law::{Column, ContactLaw, LawVisitor, Touch};
 use super::observe::Observed;
 use super::simd::Simd;
-use super::touches::{BATCH, BlockTouches, Content, LawTouch};
+use super::touches::{BATCH, BlockTouches, Content};
 use crate::config::PairConfig;
-use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
+use crate::contact::section::{BLOCK, Partners, Section};
 use crate::state::particles::Record;
 use crate::state::shape::Shape;
 use std::ops::Range;
 
 mod ellipsoids;
+mod laws;
+mod spheres;
+
+use laws::Laws;
 
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
 
 /// How many blocks ahead memory and records are asked for.
 const PREFETCH: usize = 8;
-
-/// Bytes of records that need no asking ahead.
-const NEAREST_CACHES: usize = 1 << 20;
 
 /// What all passes of a step share.
 #[derive(Debug, Clone, Copy)]
@@ -206,7 +207,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);
             prefetch(&section.memory, (start + PREFETCH) * C::MEMORY, BATCH * C::MEMORY);
-            let found = geometry_pass(input, records, section, blocks.clone(), content, touches);
+            let found = spheres::geometry(input, records, section, blocks.clone(), content, touches);
             excess = excess.or(found);
             let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
             let memory = &mut section.memory[blocks.start * C::MEMORY..blocks.end * C::MEMORY];
@@ -370,212 +371,6 @@ impl<C: ContactLaw> LawPass<C> {
         let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
         observed.touch(section.origin + first[0] as usize, &pair, &response, virials, wall);
     }
-}
-
-/// A law in the loop over the touches of some blocks.
-struct Laws<'a, C> {
-    law: &'a C,
-    stride: usize,
-    time_step: f64,
-}
-
-impl<C: ContactLaw> Laws<'_, C> {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn avx2<const LEDGER: bool>(&self, touches: &mut [BlockTouches], memory: &mut [CacheLine], lines: &mut LineRing) {
-        self.blocks::<F64x4, LEDGER>(touches, memory, lines);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512vl")]
-    fn avx512<const LEDGER: bool>(&self, touches: &mut [BlockTouches], memory: &mut [CacheLine], lines: &mut LineRing) {
-        self.blocks::<F64x8, LEDGER>(touches, memory, lines);
-    }
-
-    /// Law and output of some blocks.
-    #[inline(always)]
-    fn blocks<L: Lane, const LEDGER: bool>(
-        &self,
-        touches: &mut [BlockTouches],
-        memory: &mut [CacheLine],
-        lines: &mut LineRing,
-    ) {
-        let lanes = || (0..BLOCK).step_by(L::WIDTH);
-        let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
-        for (block, touches) in touches.iter_mut().enumerate() {
-            for lane in lanes() {
-                let pair = touches.touch::<L>(lane);
-                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
-                    self.law.normal(&pair.touch, memory)
-                });
-                touches.put_normal(lane, &normal, LEDGER);
-            }
-        }
-        for (block, touches) in touches.iter().enumerate() {
-            for lane in lanes() {
-                let slot = ((lines.first + block * BLOCK + lane) & lines.mask) * self.stride;
-                let rows = &mut lines.values[slot..slot + L::WIDTH * self.stride];
-                let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
-                let rest = C::NORMAL_MEMORY..C::MEMORY;
-                let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
-                    self.law.complete(&pair.touch, &normal, memory)
-                });
-                self.write::<L, LEDGER>(&pair, &response, rows, false);
-            }
-        }
-    }
-
-    /// Law and output of a wall contact.
-    fn wall<const LEDGER: bool>(&self, pair: &PairTouch<f64>, memory: &mut [CacheLine], lane: usize, rows: &mut [f64]) {
-        let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
-        let response =
-            with_memory(memory, 0..C::MEMORY, lane, pair.alive, |memory| self.law.evaluate(&pair.touch, memory));
-        self.write::<f64, LEDGER>(&pair, &response, rows, true);
-    }
-
-    /// Output of `L::WIDTH` contacts.
-    #[inline(always)]
-    fn write<L: Lane, const LEDGER: bool>(
-        &self,
-        pair: &LawTouch<L>,
-        response: &ContactResponse<L>,
-        rows: &mut [f64],
-        wall: bool,
-    ) {
-        let zero = L::splat(0.0);
-        let kept = |value: L| L::select(pair.alive, value, zero);
-        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
-        let stride = self.stride;
-        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
-        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
-        if own >= 8 {
-            let turning = cross(pair.touch.normal, response.tangential_force);
-            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
-        }
-        if own >= 12 {
-            let moment = response.moment;
-            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
-        }
-        if LEDGER {
-            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
-            let work = kept(dot(force, pair.imposed_velocity) * L::splat(self.time_step));
-            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
-            let e = &response.energies;
-            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
-            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
-        }
-    }
-}
-
-/// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number.
-fn geometry_pass(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    match input.simd {
-        // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx512 => unsafe { geometry_avx512(input, records, section, blocks, content, touches) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Simd::Avx2 => unsafe { geometry_avx2(input, records, section, blocks, content, touches) },
-        _ => geometry_of::<f64>(input, records, section, blocks, content, touches),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn geometry_avx2(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    geometry_of::<F64x4>(input, records, section, blocks, content, touches)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl")]
-fn geometry_avx512(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    geometry_of::<F64x8>(input, records, section, blocks, content, touches)
-}
-
-#[inline(always)]
-fn geometry_of<L: Lane>(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    let mut excess = None;
-    let limit = L::splat(input.max_overlap_fraction);
-    let lanes = || (0..BLOCK).step_by(L::WIDTH);
-    let far = size_of_val(records) > NEAREST_CACHES;
-    for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
-        for lane in lanes() {
-            let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
-            if far && places.end + PREFETCH * BLOCK <= section.second.len() {
-                for place in places.start + PREFETCH * BLOCK..places.end + PREFETCH * BLOCK {
-                    let (first, second) = (section.first[place], section.second[place]);
-                    prefetch(records, if first < second { second } else { first } as usize, 1);
-                }
-            }
-            let a = Bodies::<L>::gather(records, &section.first[places.clone()]);
-            let b = Bodies::<L>::gather(records, &section.second[places.clone()]);
-            touches.put_relative(lane, &geometry::relative(&a, &b, &section.shift[places], input.motion), content);
-        }
-    }
-    for (block, touches) in blocks.zip(touches) {
-        for lane in lanes() {
-            let pair = geometry::touch(&touches.relative::<L>(lane));
-            touches.put_touch(lane, &pair, content.range);
-            // Written so that NaN counts as a fault.
-            let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
-            if excess.is_none() && L::any(pair.touching & !within) {
-                let (fraction, place) = (input.max_overlap_fraction, block * BLOCK + lane);
-                excess = first_excess(pair.touching, pair.touch.overlap, pair.min_radius, fraction, place);
-            }
-        }
-    }
-    excess
-}
-
-/// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
-#[inline(always)]
-fn with_memory<L: Lane, T>(
-    memory: &mut [CacheLine],
-    columns: Range<usize>,
-    lane: usize,
-    alive: L::Mask,
-    law: impl FnOnce(&mut [L]) -> T,
-) -> T {
-    let zero = L::splat(0.0);
-    let mut values = [zero; MAX_MEMORY];
-    let memory = &mut memory[columns];
-    let values = &mut values[..memory.len()];
-    for (value, column) in values.iter_mut().zip(&*memory) {
-        *value = L::load(&column.0[lane..]);
-    }
-    let response = law(values);
-    for (value, column) in values.iter().zip(memory) {
-        L::select(alive, *value, zero).store(&mut column.0[lane..]);
-    }
-    response
 }
 
 /// The first lane that overlaps too much or is not a number.

@@ -107,8 +107,7 @@ impl Phase<'_> {
         }
         let section = &mut sections[run.section as usize - first_section];
         let blocks = run.block as usize..(run.block + run.blocks) as usize;
-        let excess =
-            self.passes[section.pair].run(Job { input: &self.input, bodies, section, blocks, lines, touches });
+        let excess = self.passes[section.pair].run(Job { input: &self.input, bodies, section, blocks, lines, touches });
         excess.map(|(place, overlap_ratio)| PassFault { section: run.section as usize, place, overlap_ratio })
     }
 

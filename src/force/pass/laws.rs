@@ -1,0 +1,146 @@
+//! The laws' stages of the contact pass: the normal law of some blocks, then the other laws and the output lines.
+
+use super::{LEDGER_STRIDE, LineRing};
+use crate::contact::section::{BLOCK, CacheLine};
+use crate::force::composition::MAX_MEMORY;
+use crate::force::geometry::PairTouch;
+use crate::force::lane::{Lane, cross, dot, scale, sub};
+#[cfg(target_arch = "x86_64")]
+use crate::force::lane::{avx2::F64x4, avx512::F64x8};
+use crate::force::law::{ContactLaw, ContactResponse};
+use crate::force::touches::{BlockTouches, LawTouch};
+use std::ops::Range;
+
+/// A law in the loop over the touches of some blocks.
+pub(super) struct Laws<'a, C> {
+    pub law: &'a C,
+    pub stride: usize,
+    pub time_step: f64,
+}
+
+impl<C: ContactLaw> Laws<'_, C> {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    pub fn avx2<const LEDGER: bool>(
+        &self,
+        touches: &mut [BlockTouches],
+        memory: &mut [CacheLine],
+        lines: &mut LineRing,
+    ) {
+        self.blocks::<F64x4, LEDGER>(touches, memory, lines);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    pub fn avx512<const LEDGER: bool>(
+        &self,
+        touches: &mut [BlockTouches],
+        memory: &mut [CacheLine],
+        lines: &mut LineRing,
+    ) {
+        self.blocks::<F64x8, LEDGER>(touches, memory, lines);
+    }
+
+    /// Law and output of some blocks.
+    #[inline(always)]
+    pub fn blocks<L: Lane, const LEDGER: bool>(
+        &self,
+        touches: &mut [BlockTouches],
+        memory: &mut [CacheLine],
+        lines: &mut LineRing,
+    ) {
+        let lanes = || (0..BLOCK).step_by(L::WIDTH);
+        let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
+        for (block, touches) in touches.iter_mut().enumerate() {
+            for lane in lanes() {
+                let pair = touches.touch::<L>(lane);
+                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
+                    self.law.normal(&pair.touch, memory)
+                });
+                touches.put_normal(lane, &normal, LEDGER);
+            }
+        }
+        for (block, touches) in touches.iter().enumerate() {
+            for lane in lanes() {
+                let slot = ((lines.first + block * BLOCK + lane) & lines.mask) * self.stride;
+                let rows = &mut lines.values[slot..slot + L::WIDTH * self.stride];
+                let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
+                let rest = C::NORMAL_MEMORY..C::MEMORY;
+                let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
+                    self.law.complete(&pair.touch, &normal, memory)
+                });
+                self.write::<L, LEDGER>(&pair, &response, rows, false);
+            }
+        }
+    }
+
+    /// Law and output of a wall contact.
+    pub fn wall<const LEDGER: bool>(
+        &self,
+        pair: &PairTouch<f64>,
+        memory: &mut [CacheLine],
+        lane: usize,
+        rows: &mut [f64],
+    ) {
+        let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
+        let response =
+            with_memory(memory, 0..C::MEMORY, lane, pair.alive, |memory| self.law.evaluate(&pair.touch, memory));
+        self.write::<f64, LEDGER>(&pair, &response, rows, true);
+    }
+
+    /// Output of `L::WIDTH` contacts.
+    #[inline(always)]
+    fn write<L: Lane, const LEDGER: bool>(
+        &self,
+        pair: &LawTouch<L>,
+        response: &ContactResponse<L>,
+        rows: &mut [f64],
+        wall: bool,
+    ) {
+        let zero = L::splat(0.0);
+        let kept = |value: L| L::select(pair.alive, value, zero);
+        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
+        let stride = self.stride;
+        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
+        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
+        if own >= 8 {
+            let turning = cross(pair.touch.normal, response.tangential_force);
+            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
+        }
+        if own >= 12 {
+            let moment = response.moment;
+            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
+        }
+        if LEDGER {
+            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
+            let work = kept(dot(force, pair.imposed_velocity) * L::splat(self.time_step));
+            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
+            let e = &response.energies;
+            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
+            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
+        }
+    }
+}
+
+/// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
+#[inline(always)]
+fn with_memory<L: Lane, T>(
+    memory: &mut [CacheLine],
+    columns: Range<usize>,
+    lane: usize,
+    alive: L::Mask,
+    law: impl FnOnce(&mut [L]) -> T,
+) -> T {
+    let zero = L::splat(0.0);
+    let mut values = [zero; MAX_MEMORY];
+    let memory = &mut memory[columns];
+    let values = &mut values[..memory.len()];
+    for (value, column) in values.iter_mut().zip(&*memory) {
+        *value = L::load(&column.0[lane..]);
+    }
+    let response = law(values);
+    for (value, column) in values.iter().zip(memory) {
+        L::select(alive, *value, zero).store(&mut column.0[lane..]);
+    }
+    response
+}
