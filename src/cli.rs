@@ -8,6 +8,7 @@ use crate::output::{checkpoint, plot};
 use crate::run::{self, Outcome, RunOptions};
 use crate::scaling::{self, ScalingOptions};
 use crate::verify;
+use crate::verify::wahn2022::Wahn2022Options;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -82,10 +83,20 @@ enum Command {
     /// Predict the parallel efficiency on many ranks from the communication model.
     Scaling(ScalingOptions),
     /// Run cases with a known answer and compare: claim, expected, got.
+    #[command(args_conflicts_with_subcommands = true)]
     Verify {
         /// Only cases with this in their name.
         filter: Option<String>,
+        #[command(subcommand)]
+        paper: Option<Paper>,
     },
+}
+
+/// A paper whose figures are recomputed.
+#[derive(Debug, Subcommand)]
+enum Paper {
+    /// Recompute and draw the figures of Wahn, Gan, Kamlah 2022 and compare with what they must show.
+    Wahn2022(Wahn2022Options),
 }
 
 impl InputArguments {
@@ -128,7 +139,10 @@ pub fn main() -> i32 {
         }),
         Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
         Command::Scaling(options) => scaling::main(&options),
-        Command::Verify { filter } => return verify::main(filter.as_deref()),
+        Command::Verify { paper: Some(Paper::Wahn2022(options)), .. } => {
+            return verify::wahn2022::main(&options).unwrap_or_else(|error| report(&error));
+        }
+        Command::Verify { filter, paper: None } => return verify::main(filter.as_deref()),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
     };
     match done {

@@ -1,7 +1,10 @@
 //! The load programme: which stage runs, what each axis does, how the cell changes in a step.
 
-use crate::config::{AxisControl, Kinematics, Stage};
+mod quasi_static;
+
+use crate::config::{AxisControl, Kinematics, Routine, Stage};
 use crate::state::GlobalState;
+use quasi_static::{enter_quasi_static, is_over_quasi_static, next_equilibrium_strain};
 
 /// Largest change of nominal strain per step: the contacts must follow the load in small increments.
 pub const MAX_STRAIN_PER_STEP: f64 = 1e-5;
@@ -54,10 +57,20 @@ impl LoadProgramme {
     /// Set the strain rates with which the current stage begins; a servo begins at rest.
     pub fn enter(&self, global: &mut GlobalState) {
         let Some(stage) = self.stage(global) else { return };
+        if stage.routine == Routine::QuasiStatic {
+            enter_quasi_static(global);
+            return;
+        }
         global.strain_rate = stage.axes.map(|axis| match axis {
             AxisControl::StrainRate(rate) => rate,
             AxisControl::Stress { .. } => 0.0,
         });
+    }
+
+    /// The running stage if it is quasi-static.
+    #[must_use]
+    pub fn quasi_static_stage(&self, global: &GlobalState) -> Option<&Stage> {
+        self.stage(global).filter(|stage| stage.routine == Routine::QuasiStatic)
     }
 
     /// Servo: new strain rates of the stress-controlled axes from the measured stress. `modulus` is an
@@ -88,6 +101,11 @@ impl LoadProgramme {
     /// What the next step does.
     #[must_use]
     pub fn plan(&self, global: &GlobalState, wanted_time_step: f64) -> StepPlan {
+        if let Some(stage) = self.quasi_static_stage(global) {
+            let next_strain = next_equilibrium_strain(stage, global).unwrap_or(global.strain);
+            let next_sides = [0, 1, 2].map(|k| global.initial_sides[k] * (1.0 - next_strain[k]));
+            return StepPlan { time_step: wanted_time_step, next_time: global.time, next_strain, next_sides };
+        }
         let end = self.stage(global).and_then(|stage| end_time(stage, global));
         let (time_step, next_time) = match end {
             // A remainder that is a hair longer than the step is taken whole.
@@ -128,14 +146,25 @@ fn end_time(stage: &Stage, global: &GlobalState) -> Option<f64> {
 }
 
 fn is_over(stage: &Stage, global: &GlobalState) -> bool {
-    let passed = |start: f64, now: f64, target: f64| if target >= start { now >= target } else { now <= target };
+    if stage.routine == Routine::QuasiStatic {
+        return is_over_quasi_static(stage, global);
+    }
     end_time(stage, global).is_some_and(|end| global.time >= end)
         || stage.steps.is_some_and(|steps| global.step - global.stage_start_step >= steps)
         || stage.until_strain.is_some_and(|(axis, target)| {
             matches!(stage.axes[axis], AxisControl::Stress { .. })
                 && passed(global.stage_start_strain[axis], global.strain[axis], target)
         })
-        || stage
-            .until_stress
-            .is_some_and(|(axis, target)| passed(global.stage_start_stress[axis], global.measured_stress[axis], target))
+        || passed_stress(stage, global)
+}
+
+/// The stress that ends the stage is passed, from below or above.
+fn passed_stress(stage: &Stage, global: &GlobalState) -> bool {
+    stage
+        .until_stress
+        .is_some_and(|(axis, target)| passed(global.stage_start_stress[axis], global.measured_stress[axis], target))
+}
+
+fn passed(start: f64, now: f64, target: f64) -> bool {
+    if target >= start { now >= target } else { now <= target }
 }

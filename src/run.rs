@@ -4,7 +4,7 @@ mod efforts;
 mod output;
 mod signals;
 
-use crate::config::Config;
+use crate::config::{Config, Interval};
 use crate::error::Result;
 use crate::exchange::{Communicator, agree};
 use crate::force::observe::Wanted;
@@ -152,11 +152,12 @@ impl Run {
 
     fn drive(mut self) -> Result<Outcome> {
         while !self.simulation.settle_stage() {
-            let wanted = self.wanted();
-            let requests = self.requests();
-            let Self { simulation, output, .. } = &mut self;
-            let agreed =
-                simulation.step(wanted, requests, |simulation, report| output.write(simulation, report, wanted))?;
+            let agreed = if self.simulation.is_quasi_static() {
+                let Some(agreed) = self.substep()? else { continue };
+                agreed
+            } else {
+                self.dynamic_step()?
+            };
             let step = self.simulation.global().step;
             let every = self.config.output.checkpoint_steps;
             if agreed.stop != 0.0 {
@@ -168,6 +169,60 @@ impl Run {
             self.output.progress(&self.simulation);
         }
         self.finish()
+    }
+
+    /// Dynamic routine (W Fig. 1, right): report what is due, one increment of strain and time.
+    fn dynamic_step(&mut self) -> Result<Requests> {
+        let wanted = self.wanted();
+        let requests = self.requests();
+        let Self { simulation, output, .. } = self;
+        simulation.step(wanted, requests, |simulation, report| output.write(simulation, report, wanted))
+    }
+
+    /// Quasi-static routine (W Fig. 1, left): report each equilibrium, then a substep of the next increment or of
+    /// the running one. `None`: the stage is over.
+    fn substep(&mut self) -> Result<Option<Requests>> {
+        let (before, increments) = (self.simulation.global().stage, self.increments());
+        if let Some(mut report) = self.simulation.test_equilibrium()? {
+            let over = self.simulation.settle_stage();
+            let wanted = self.wanted_at_equilibrium(self.increments() > increments);
+            // The last state of all is reported when the run ends.
+            if !over && (wanted.sums || wanted.samples) {
+                if wanted.samples {
+                    report.samples = self.simulation.observe(wanted)?.samples;
+                }
+                self.output.write(&mut self.simulation, &report, wanted)?;
+            }
+            if over || self.simulation.global().stage != before {
+                return Ok(None);
+            }
+        }
+        let requests = self.requests();
+        self.simulation.step(Wanted::default(), requests, |_, _| Ok(())).map(Some)
+    }
+
+    fn increments(&self) -> u64 {
+        self.simulation.global().quasi_static.map_or(0, |state| state.increments)
+    }
+
+    /// What is due at a new equilibrium (`reached`), or else at the start of a stage: the first state of all.
+    fn wanted_at_equilibrium(&self, reached: bool) -> Wanted {
+        let (global, increments) = (self.simulation.global(), self.increments());
+        let counted = |every: u64| increments.is_multiple_of(every);
+        let history = match self.config.output.history {
+            Interval::Increments(every) => counted(every),
+            // Time stands still, and rows between equilibria would mean nothing.
+            Interval::Steps(_) | Interval::Time(_) => true,
+        };
+        let snapshot = match self.config.output.snapshots {
+            Some(Interval::Increments(every)) => counted(every),
+            Some(every) => is_due(every, global, global.snapshots),
+            None => false,
+        };
+        Wanted {
+            sums: history && (reached || global.history_rows == 0),
+            samples: snapshot && (reached || global.snapshots == 0),
+        }
     }
 
     /// What is due at the present state. Counting what is written keeps this the same after a restart.

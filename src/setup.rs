@@ -87,6 +87,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         snapshots: 0,
         measured_stress: [0.0; 3],
         particles: count,
+        quasi_static: None,
     };
     programme(config).enter(&mut global);
     Ok(Initial { global, particles, memory: ContactMemory::new(0) })

@@ -9,6 +9,7 @@ mod plastic;
 mod scene;
 mod sliding;
 mod viscoelastic;
+pub mod wahn2022;
 
 use crate::error::Result;
 use std::time::Instant;

@@ -2,7 +2,7 @@
 
 use super::diagnostic::{Problem, Source, render};
 use super::section::{Reader, Section};
-use super::{Config, contact, document, keys, particles, settings, stages};
+use super::{Config, contact, document, keys, particles, routine, settings, stages};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -86,10 +86,15 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     };
     let pairs = contact::read(root, &context);
     let load = stages::read_load(root);
-    let stages = stages::read(root, cell.as_ref());
+    let common = routine::of_load(root);
+    let stages = stages::read(root, cell.as_ref(), common);
+    let quasi_static = routine::read(root);
     let time_step = settings::read_time_step(root);
     let output = settings::read_output(root, &stem);
     let parallel = settings::read_parallel(root);
+    if let Some(stages) = &stages {
+        routine::check(root, stages, species.as_deref());
+    }
     let (cell, (packing, replication), species) = (cell?, packing?, species?);
     settings::check_cell(root, &cell, &packing, &species);
     let (pairs, max_overlap_fraction) = pairs?;
@@ -104,6 +109,7 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
         replication,
         gravity: gravity?,
         kinematics,
+        quasi_static: quasi_static?,
         stages: stages?,
         time_step: time_step?,
         control_interval,

@@ -1,8 +1,10 @@
 //! Every section and key of the input.
 
 mod particles;
+mod routine;
 
 pub use particles::{MATERIAL, MAXWELL, MOTION, RADIUS, SPECIES};
+pub use routine::QUASI_STATIC;
 
 use super::schema::{Default, Key, Kind, Range, Table, key};
 use crate::force::registry::Role;
@@ -159,6 +161,12 @@ pub static PACKING: Table = Table {
     meaning: "How the initial positions are made.",
     keys: &[
         key("random_close", Kind::Table(&RANDOM_CLOSE), Absent, "Jodrey-Tory random close packing."),
+        key(
+            "relaxation",
+            Kind::Table(&RELAXATION),
+            Absent,
+            "Random packing by relaxation of overlaps, of spheres and ellipsoids.",
+        ),
         key("file", Kind::Table(&FILE), Absent, "Particles from a file."),
     ],
 };
@@ -176,6 +184,24 @@ const PERTURBATION: Key = key(
     ZERO,
     "Every particle is moved at random by at most this fraction of its radius, so that copies differ.",
 );
+
+static RELAXATION: Table = Table {
+    meaning: "Random packing of spheres and ellipsoids in a periodic cell: random places and orientations are compressed \
+              by a pressure that falls step by step, and ends with particles just touching. With a solid fraction \
+              below the one where they jam, overlaps are relaxed in a cell of that size instead.",
+    keys: &[
+        key(
+            "tolerance",
+            number(Dimension::NONE, Range::closed(1e-4, 0.5)),
+            Default::Number(0.03),
+            "Residual force over mean contact force at which a pressure counts as balanced; smaller is a little denser \
+             and slower.",
+        ),
+        key("max_steps", Kind::Integer(1), Default::Integer(50_000), "Give up after this many steps at one pressure."),
+        REPLICATE,
+        PERTURBATION,
+    ],
+};
 
 static RANDOM_CLOSE: Table = Table {
     meaning: "Jodrey-Tory random close packing of spheres in a periodic cell; ends with spheres just touching.",
@@ -229,7 +255,13 @@ pub static LOAD: Table = Table {
             "routine",
             Kind::Choice(&["dynamic", "quasi_static"]),
             Default::Word("dynamic"),
-            "dynamic: physical time. (quasi_static is not available yet.)",
+            "dynamic: physical time; quasi_static: equilibria, one strain increment after the other. Stages may differ.",
+        ),
+        key(
+            "quasi_static",
+            Kind::Table(&QUASI_STATIC),
+            Derived("all its defaults"),
+            "How quasi-static stages find their equilibria.",
         ),
         key(
             "control_interval",
@@ -243,7 +275,8 @@ pub static LOAD: Table = Table {
 /// `[[stage]]`.
 pub static STAGE: Table = Table {
     meaning: "A stage of the load programme; it ends at the first of its end conditions that is met. Compression is \
-              positive. Give `strain_rate`, `stress` (on other axes) or `hold`; or `cycles` and [[stage.part]].",
+              positive. Dynamic: give `strain_rate`, `stress` (on other axes) or `hold`. Quasi-static: give \
+              `strain_increment` or `relax`. Or give `cycles` and [[stage.part]].",
     keys: &[
         key("name", Kind::Text, Derived("stage 1, stage 2, …"), "Name shown in the log."),
         key("cycles", Kind::Integer(1), Absent, "Run the parts of this stage so many times."),
@@ -255,6 +288,10 @@ pub static STAGE: Table = Table {
         PART_KEYS[5],
         PART_KEYS[6],
         PART_KEYS[7],
+        PART_KEYS[8],
+        PART_KEYS[9],
+        PART_KEYS[10],
+        PART_KEYS[11],
     ],
 };
 
@@ -262,7 +299,7 @@ pub static STAGE: Table = Table {
 pub static PART: Table =
     Table { meaning: "One part of a cycle; keys as in [[stage]], without `cycles`.", keys: &PART_KEYS };
 
-const PART_KEYS: [Key; 8] = [
+const PART_KEYS: [Key; 12] = [
     key("name", Kind::Text, Derived("part 1, part 2, …"), "Name shown in the log."),
     key(
         "strain_rate",
@@ -281,6 +318,15 @@ const PART_KEYS: [Key; 8] = [
     ),
     key("until_stress", Kind::Table(&UNTIL_STRESS), Absent, "Ends when the stress of the axis passes this value."),
     key("steps", Kind::Integer(1), Absent, "Ends after so many steps."),
+    key("routine", Kind::Choice(&["dynamic", "quasi_static"]), Derived("that of [load]"), "Routine of this stage."),
+    key(
+        "strain_increment",
+        Kind::Axes { dimension: Dimension::NONE, range: Range::between(-0.01, 0.01), uniform: true },
+        Absent,
+        "Quasi-static: nominal strain from one equilibrium to the next; ends by until_strain, until_stress, increments.",
+    ),
+    key("increments", Kind::Integer(1), Absent, "Quasi-static: ends after so many increments."),
+    key("relax", Kind::Flag, Absent, "true: quasi-static, the cell stays as it is until there is equilibrium."),
 ];
 
 static STRESS: Table = Table {
@@ -350,6 +396,12 @@ pub static OUTPUT: Table = Table {
         key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory."),
         key("history", Kind::Interval, Default::Word("1000 steps"), "A row of history.csv every so often."),
         key("snapshots", Kind::Interval, Absent, "A snapshot every so often; none without it."),
+        key(
+            "dump",
+            Kind::Flag,
+            Default::Flag(false),
+            "Write each snapshot also as a LAMMPS text dump, for OVITO: particles-NUMBER.dump.",
+        ),
         key("snapshot_contacts", Kind::Flag, Default::Flag(false), "Write contacts with force and memory too."),
         key(
             "checkpoint_steps",

@@ -12,15 +12,19 @@ mod programme;
 mod radius;
 mod reference;
 mod resolved;
+mod routine;
 pub mod schema;
 mod section;
 mod settings;
+mod shape;
 pub mod sheet;
 mod stages;
 mod values;
 
 pub use build::load;
 pub use reference::{example, reference_markdown};
+pub use routine::{Damping, QuasiStaticConfig, Routine};
+pub use shape::ShapeConfig;
 
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;
@@ -46,6 +50,8 @@ pub struct Config {
     pub gravity: [f64; 3],
     /// BCT or BC (PHYSICS.md section 5).
     pub kinematics: Kinematics,
+    /// How quasi-static stages find their equilibria.
+    pub quasi_static: QuasiStaticConfig,
     /// What follows what; at least one stage.
     pub stages: Vec<Stage>,
     /// The time step.
@@ -194,8 +200,10 @@ pub struct Species {
     pub name: String,
     /// Index into [`Config::materials`].
     pub material: usize,
-    /// Radii.
+    /// Radii; of ellipsoids those of spheres of equal volume.
     pub radius: RadiusDistribution,
+    /// Semi-axes.
+    pub shape: ShapeConfig,
     /// Number of particles (0 when a file gives the particles).
     pub count: usize,
     /// How it moves.
@@ -232,6 +240,13 @@ pub enum PackingConfig {
         contraction_rate: f64,
         /// Give up after this many moves per particle.
         max_moves_per_particle: f64,
+    },
+    /// Relaxation of overlaps under a falling pressure; also for ellipsoids.
+    Relaxation {
+        /// Residual force over mean contact force at which a pressure counts as balanced.
+        tolerance: f64,
+        /// Give up after this many steps at one pressure.
+        max_steps: usize,
     },
     /// From a CSV, HDF5 or LAMMPS data file.
     File {
@@ -294,7 +309,9 @@ pub enum AxisControl {
 pub struct Stage {
     /// Name shown in the log.
     pub name: String,
-    /// Control per axis.
+    /// Dynamic or quasi-static.
+    pub routine: Routine,
+    /// Control per axis. In a quasi-static stage strain rates count per increment.
     pub axes: [AxisControl; 3],
     /// Ends after this time \[s\] since its start.
     pub duration: Option<f64>,
@@ -304,6 +321,8 @@ pub struct Stage {
     pub until_stress: Option<(usize, f64)>,
     /// Number of steps; mostly for tests and benches.
     pub steps: Option<u64>,
+    /// Number of increments of a quasi-static stage.
+    pub increments: Option<u64>,
 }
 
 /// The time step.
@@ -332,6 +351,8 @@ pub struct OutputConfig {
     pub snapshots: Option<Interval>,
     /// Also write the contacts as lines with force and memory.
     pub snapshot_contacts: bool,
+    /// Write each snapshot also as a LAMMPS text dump.
+    pub dump: bool,
     /// Checkpoint every this many steps (0: none but the last).
     pub checkpoint_steps: u64,
     /// Checkpoint every this much wall time \[s\].
@@ -353,6 +374,8 @@ pub enum Interval {
     Steps(u64),
     /// At the first step at or after each multiple of this time \[s\].
     Time(f64),
+    /// Every so many equilibria of quasi-static stages.
+    Increments(u64),
 }
 
 /// Ranks, threads, lists.

@@ -210,7 +210,7 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
     let name = section.text("name");
     let material = section.text("material");
     let material = material.and_then(|name| find_material(section, "material", &name, materials));
-    let radius = section.choose("radius").and_then(read_radius);
+    let size = super::shape::read(section, section.choose("radius").and_then(read_radius));
     let motion = section.choose("motion").and_then(read_motion);
     let velocity = section.axes("velocity");
     let velocity_deviation = section.number("velocity_deviation");
@@ -224,10 +224,12 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
             );
         }
     }
+    let (radius, shape) = size?;
     Some(Species {
         name: name?,
         material: material?,
-        radius: radius?,
+        radius,
+        shape,
         count: 0,
         motion: motion?,
         velocity: velocity?,

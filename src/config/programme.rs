@@ -1,13 +1,15 @@
 //! Follows the load programme on paper: how long stages last and where the strain is after them,
 //! as far as this is known without running.
 
-use super::{AxisControl, Stage};
+use super::{AxisControl, Routine, Stage};
 
 /// Time and strain at some point of the programme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Progress {
     /// Time of the stages whose length is known \[s\].
     pub time: f64,
+    /// Increments of the quasi-static stages whose length is known.
+    pub increments: f64,
     /// All stages so far have a known length.
     pub complete: bool,
     /// Strain per axis; `None` once a servo or an unknown length made it unknown.
@@ -16,7 +18,7 @@ pub(super) struct Progress {
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { time: 0.0, complete: true, strain: [Some(0.0); 3] }
+        Self { time: 0.0, increments: 0.0, complete: true, strain: [Some(0.0); 3] }
     }
 }
 
@@ -28,14 +30,15 @@ impl Progress {
     }
 }
 
-/// Length of a stage \[s\] that starts at these strains, if time or strain end it. A stress or a
-/// number of steps may end it sooner.
+/// Length of a stage that starts at these strains, in seconds or in increments, if that, time or strain end it.
+/// A stress or a number of steps may end it sooner.
 pub(super) fn stage_duration(strain: [Option<f64>; 3], stage: &Stage) -> Option<f64> {
     let by_strain = stage.until_strain.and_then(|(axis, target)| match stage.axes[axis] {
         AxisControl::StrainRate(rate) if rate != 0.0 => strain[axis].map(|start| (target - start) / rate),
         _ => None,
     });
-    let candidates = [stage.duration, by_strain.filter(|time| *time > 0.0)];
+    let counted = stage.increments.map(|count| count as f64);
+    let candidates = [stage.duration, counted, by_strain.filter(|time| *time > 0.0)];
     candidates.into_iter().flatten().reduce(f64::min)
 }
 
@@ -43,7 +46,10 @@ pub(super) fn stage_duration(strain: [Option<f64>; 3], stage: &Stage) -> Option<
 pub(super) fn advance(progress: &mut Progress, stage: &Stage) {
     let duration = stage_duration(progress.strain, stage);
     let certain = stage.until_stress.is_none() && stage.steps.is_none();
-    progress.time += duration.unwrap_or(0.0);
+    match stage.routine {
+        Routine::Dynamic => progress.time += duration.unwrap_or(0.0),
+        Routine::QuasiStatic => progress.increments += duration.unwrap_or(0.0).ceil(),
+    }
     progress.complete &= duration.is_some() && certain;
     for (strain, control) in progress.strain.iter_mut().zip(stage.axes) {
         *strain = match (control, duration) {

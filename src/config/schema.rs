@@ -98,7 +98,7 @@ pub enum Kind {
     Flag,
     /// One of these words.
     Choice(&'static [&'static str]),
-    /// `"0.1 s"` or `"1000 steps"`.
+    /// `"0.1 s"`, `"1000 steps"` or `"10 increments"`.
     Interval,
     /// A section.
     Table(&'static Table),
@@ -180,7 +180,9 @@ impl Kind {
             Self::Texts(count) => format!("a list of {count} texts"),
             Self::Flag => "true or false".to_owned(),
             Self::Choice(words) => quoted(words),
-            Self::Interval => "a time such as \"0.1 s\" or a count such as \"1000 steps\", greater than 0".to_owned(),
+            Self::Interval => {
+                "a time such as \"0.1 s\" or a count such as \"1000 steps\" or \"10 increments\", greater than 0".to_owned()
+            }
             Self::Table(_) => "a section".to_owned(),
             Self::List(_) => "sections in double brackets, [[…]]".to_owned(),
             Self::OneOf(table, _) => {

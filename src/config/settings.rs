@@ -64,6 +64,12 @@ pub(super) fn read_packing(
             section.record_text("path", &path.to_string_lossy());
             Some((PackingConfig::File { path }, replication?))
         }
+        Chosen::Table("relaxation", section) => {
+            let (tolerance, max_steps) = (section.number("tolerance"), section.integer("max_steps"));
+            let replication = read_replication(&section, cell);
+            let packing = PackingConfig::Relaxation { tolerance: tolerance?, max_steps: max_steps? as usize };
+            Some((packing, replication?))
+        }
         Chosen::Table(_, section) => {
             let contraction_rate = section.number("contraction_rate");
             let max_moves_per_particle = section.number("max_moves_per_particle");
@@ -95,6 +101,8 @@ fn read_replication(section: &Section, cell: Option<&CellConfig>) -> Option<Repl
 
 /// Spheres that fill more than this cannot be packed (the densest packing of equal spheres).
 const DENSEST: f64 = 0.7405;
+/// The densest packing known of ellipsoids (Donev et al. 2004, doi:10.1103/PhysRevLett.92.255506).
+const DENSEST_OF_ELLIPSOIDS: f64 = 0.7708;
 
 /// Whether cell, packing and particles fit together.
 pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingConfig, species: &[Species]) {
@@ -109,18 +117,27 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         }
         return;
     }
+    let spherical = species.iter().all(Species::is_spherical);
+    if matches!(packing, PackingConfig::RandomClose { .. }) && !spherical {
+        let remedy = "use [packing.relaxation], which packs ellipsoids too";
+        root.problem("packing", "random_close packs spheres only, and a species has ellipsoids", remedy);
+    }
+    if matches!(packing, PackingConfig::Relaxation { .. }) && cell.boundary.iter().any(|b| *b != Boundary::Periodic) {
+        let remedy = "make the boundary periodic, or use [packing.random_close] (spheres) or [packing.file]";
+        root.problem("packing", "relaxation has no walls, and the cell has some", remedy);
+    }
     let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
         (None, Some(fraction)) => ("solid_fraction", fraction),
         (None, None) => return,
     };
-    if fraction > DENSEST {
+    if fraction > if spherical { DENSEST } else { DENSEST_OF_ELLIPSOIDS } {
         let message = format!("the particles would fill {fraction:.3} of the cell");
         let remedy = "spheres cannot fill more than 0.74, random ones about 0.64: use a larger cell or fewer particles";
         section.problem(key, message, remedy);
     }
-    let largest = species.iter().map(|s| s.radius.max()).fold(0.0, f64::max);
+    let largest = species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
     for axis in 0..3 {
         if let Some(side) = cell.sides.map(|sides| sides[axis]).filter(|side| *side < 2.0 * largest) {
             let message = format!(
@@ -163,6 +180,10 @@ pub(super) fn read_output(root: &Section, stem: &str) -> Option<OutputConfig> {
     if snapshot_contacts == Some(true) && !section.given("snapshots") {
         section.problem("snapshot_contacts", "has no effect without snapshots", "add snapshots = \"1 s\" or remove it");
     }
+    let dump = section.flag("dump");
+    if dump == Some(true) && !section.given("snapshots") {
+        section.problem("dump", "has no effect without snapshots", "add snapshots = \"1 s\" or remove it");
+    }
     let checkpoint_steps = section.integer("checkpoint_steps");
     let checkpoint_wall_time = section.number("checkpoint_wall_time");
     let checkpoints_kept = section.integer("checkpoints_kept");
@@ -174,6 +195,7 @@ pub(super) fn read_output(root: &Section, stem: &str) -> Option<OutputConfig> {
         history: history?,
         snapshots,
         snapshot_contacts: snapshot_contacts?,
+        dump: dump?,
         checkpoint_steps: checkpoint_steps?,
         checkpoint_wall_time,
         checkpoints_kept: usize::try_from(checkpoints_kept?).ok()?,

@@ -1,8 +1,10 @@
 //! The pre-run sheet: what a run will be like, from the input alone. All numbers are estimates for
 //! the reader's judgement; no simulation reads them.
 
+mod quasi_static;
+
 use super::programme::{Progress, advance};
-use super::{AxisControl, Config, Material, PackingConfig, PairConfig, Species, TimeStepConfig};
+use super::{AxisControl, Config, Material, PackingConfig, PairConfig, Routine, Species, TimeStepConfig};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -23,6 +25,7 @@ pub fn sheet(config: &Config) -> String {
     particles(&mut table, config, &estimate);
     times(&mut table, config, &estimate);
     regime(&mut table, config, &estimate);
+    quasi_static::rows(&mut table, config, &estimate);
     let mut text = format!("{}\n\n", config.title);
     let width = table.rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     for (name, value) in &table.rows {
@@ -69,9 +72,7 @@ impl Estimate {
         let solid_volume: f64 = copies * volumes.sum::<f64>();
         let solid_fraction = match (config.cell.sides, &config.packing) {
             (_, PackingConfig::File { .. }) => None,
-            (Some(sides), PackingConfig::RandomClose { .. }) => {
-                Some(solid_volume / (copies * sides[0] * sides[1] * sides[2]))
-            }
+            (Some(sides), _) => Some(solid_volume / (copies * sides[0] * sides[1] * sides[2])),
             (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
         let mut progress = Progress::default();
@@ -81,6 +82,7 @@ impl Estimate {
             for axis in 0..3 {
                 strain = strain.max(progress.strain[axis].unwrap_or(0.0));
                 match stage.axes[axis] {
+                    AxisControl::StrainRate(_) if stage.routine == Routine::QuasiStatic => {}
                     AxisControl::StrainRate(value) => rate = rate.max(value.abs()),
                     AxisControl::Stress { target, max_rate } => {
                         rate = rate.max(max_rate);
@@ -90,7 +92,7 @@ impl Estimate {
             }
             stress = stress.max(stage.until_stress.map_or(0.0, |(_, value)| value));
         }
-        let largest = config.species.iter().map(|s| s.radius.max()).fold(0.0, f64::max);
+        let largest = config.species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
         let initial = config.species.iter().map(|s| norm(s.velocity) + 3.0 * s.velocity_deviation).fold(0.0, f64::max);
         let velocity = initial.max(rate * 2.0 * largest);
         let fraction = solid_fraction.unwrap_or(RANDOM_CLOSE);
@@ -294,6 +296,9 @@ fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
             );
         }
         None => table.row("Hertz time", "none: nothing moves at the start"),
+    }
+    if config.stages.iter().all(|stage| stage.routine == Routine::QuasiStatic) {
+        return;
     }
     let length = if estimate.progress.complete { "" } else { "at least " };
     let time = estimate.progress.time;

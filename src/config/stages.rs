@@ -2,6 +2,7 @@
 
 use super::programme::{Progress, advance};
 use super::section::Section;
+use super::routine::{self, Routine};
 use super::{AxisControl, Boundary, CellConfig, Kinematics, Stage};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -10,15 +11,12 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 pub(super) fn read_load(root: &Section) -> Option<(Kinematics, u64)> {
     let section = root.table("load")?;
     let kinematics = section.choice("kinematics").map(|index| [Kinematics::Bct, Kinematics::Bc][index]);
-    if section.choice("routine") == Some(1) {
-        section.problem("routine", "the quasi_static routine is not available yet", "use routine = \"dynamic\"");
-    }
     let interval = section.integer("control_interval");
     Some((kinematics?, interval?))
 }
 
 /// Read `[[stage]]`, cycles written out.
-pub(super) fn read(root: &Section, cell: Option<&CellConfig>) -> Option<Vec<Stage>> {
+pub(super) fn read(root: &Section, cell: Option<&CellConfig>, routine: Routine) -> Option<Vec<Stage>> {
     let mut stages: Vec<Option<Stage>> = Vec::new();
     let mut progress = Progress::default();
     for (index, section) in root.list("stage").iter().enumerate() {
@@ -26,7 +24,7 @@ pub(super) fn read(root: &Section, cell: Option<&CellConfig>) -> Option<Vec<Stag
         let cycles = section.integer("cycles");
         let parts = section.list("part");
         if !section.given("cycles") && !section.given("part") {
-            let stage = read_stage(section, name, cell);
+            let stage = read_stage(section, name, cell, routine);
             push(section, &mut stages, &mut progress, stage);
             continue;
         }
@@ -36,7 +34,7 @@ pub(super) fn read(root: &Section, cell: Option<&CellConfig>) -> Option<Vec<Stag
             .enumerate()
             .map(|(k, part)| {
                 let name = part.text_or("name", &format!("part {}", k + 1)).unwrap_or_default();
-                (read_stage(&part, name, cell), part)
+                (read_stage(&part, name, cell, routine), part)
             })
             .collect();
         let cycles = cycles.unwrap_or(1);
@@ -60,6 +58,21 @@ pub(super) fn read(root: &Section, cell: Option<&CellConfig>) -> Option<Vec<Stag
 
 const MAX_STAGES: u64 = 100_000;
 
+/// Keys of a stage that say what it does.
+const OWN_LOAD: [&str; 11] = [
+    "strain_rate",
+    "stress",
+    "hold",
+    "duration",
+    "until_strain",
+    "until_stress",
+    "steps",
+    "routine",
+    "strain_increment",
+    "increments",
+    "relax",
+];
+
 fn refuse_own_load(section: &Section) {
     if !section.given("part") {
         section.problem("part", "missing", "say what one cycle consists of, in [[stage.part]] sections");
@@ -67,20 +80,37 @@ fn refuse_own_load(section: &Section) {
     if !section.given("cycles") {
         section.problem("cycles", "missing", "say how often the parts are run, for example cycles = 3");
     }
-    let own = ["strain_rate", "stress", "hold", "duration", "until_strain", "until_stress", "steps"];
-    for key in own.into_iter().filter(|key| section.given(key)) {
+    for key in OWN_LOAD.into_iter().filter(|key| section.given(key)) {
         section.problem(key, "has no effect beside [[stage.part]]", "move it into a [[stage.part]]");
     }
 }
 
-fn read_stage(section: &Section, name: String, cell: Option<&CellConfig>) -> Option<Stage> {
+fn read_stage(section: &Section, name: String, cell: Option<&CellConfig>, common: Routine) -> Option<Stage> {
+    let routine = routine::of_stage(section, common)?;
+    if !routine::refuse_keys_of_the_other(section, routine) {
+        return None;
+    }
+    let ends = (one_axis(section, "until_strain"), one_axis(section, "until_stress"));
+    match routine {
+        Routine::Dynamic => read_dynamic(section, name, cell, ends),
+        Routine::QuasiStatic => routine::read_stage(section, name, ends),
+    }
+}
+
+/// Ends of a stage by strain and by stress: axis and value.
+pub(super) type Ends = (Option<(usize, f64)>, Option<(usize, f64)>);
+
+fn read_dynamic(
+    section: &Section,
+    name: String,
+    cell: Option<&CellConfig>,
+    (until_strain, until_stress): Ends,
+) -> Option<Stage> {
     let rates = section.axes("strain_rate");
     let hold = section.flag("hold");
     let servos = read_servos(section, cell);
     let duration = section.number("duration");
     let steps = section.integer("steps");
-    let until_strain = one_axis(section, "until_strain");
-    let until_stress = one_axis(section, "until_stress");
     let given = ["strain_rate", "stress", "hold"].map(|key| section.given(key));
     if given == [false; 3] || hold == Some(false) && !given[0] && !given[1] {
         section.problem(
@@ -112,7 +142,8 @@ fn read_stage(section: &Section, name: String, cell: Option<&CellConfig>) -> Opt
         }
     }
     let axes = [0, 1, 2].map(|axis| servos[axis].unwrap_or(AxisControl::StrainRate(rates[axis])));
-    Some(Stage { name, axes, duration, until_strain, until_stress, steps })
+    let routine = Routine::Dynamic;
+    Some(Stage { name, routine, axes, duration, until_strain, until_stress, steps, increments: None })
 }
 
 fn read_servos(section: &Section, cell: Option<&CellConfig>) -> Option<[Option<AxisControl>; 3]> {
@@ -168,15 +199,24 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
         stages.push(None);
         return;
     };
-    let only_strain = stage.duration.is_none() && stage.steps.is_none() && stage.until_stress.is_none();
+    let only_strain = stage.duration.is_none()
+        && stage.steps.is_none()
+        && stage.increments.is_none()
+        && stage.until_stress.is_none();
     if let (Some((axis, target)), true) = (stage.until_strain, only_strain)
         && let AxisControl::StrainRate(rate) = stage.axes[axis]
     {
         let start = progress.strain[axis];
         if rate == 0.0 || start.is_some_and(|start| (target - start) * rate <= 0.0) {
             let start = start.map_or_else(String::new, |start| format!(" from strain {start}"));
-            let message = format!("never reached{start} at strain rate {rate} 1/s of the {} axis", AXES[axis]);
-            section.problem("until_strain", message, "change the value, the strain rate's sign, or end by duration");
+            let (what, other) = match stage.routine {
+                Routine::Dynamic => (format!("at strain rate {rate} 1/s"), "the strain rate's sign, or end by duration"),
+                Routine::QuasiStatic => {
+                    (format!("in increments of {rate}"), "the increment's sign, or end by increments")
+                }
+            };
+            let message = format!("never reached{start} {what} of the {} axis", AXES[axis]);
+            section.problem("until_strain", message, format!("change the value, {other}"));
             progress.lose_track();
             stages.push(None);
             return;

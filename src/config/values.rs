@@ -282,7 +282,7 @@ impl<'a> Section<'a> {
         words.iter().position(|word| *word == value)
     }
 
-    /// A time or a number of steps.
+    /// A time, or a number of steps or increments.
     pub fn interval(&self, name: &str) -> Option<Interval> {
         let (key, node) = self.lookup(name);
         let text = match (node, key.default) {
@@ -302,6 +302,7 @@ impl<'a> Section<'a> {
                 let resolved = match interval {
                     Interval::Steps(steps) => format!("{steps} steps"),
                     Interval::Time(time) => format!("{time:?} s"),
+                    Interval::Increments(count) => format!("{count} increments"),
                 };
                 self.record(name, resolved, "");
                 Some(interval)
@@ -324,11 +325,14 @@ pub(super) fn unit_of(kind: &Kind) -> String {
 
 fn parse_interval(text: &str) -> Result<Interval, String> {
     let trimmed = text.trim();
-    if let Some(count) = trimmed.strip_suffix("steps").or_else(|| trimmed.strip_suffix("step")) {
-        return match count.trim().parse::<u64>() {
-            Ok(steps) if steps > 0 => Ok(Interval::Steps(steps)),
-            _ => Err(format!("`{}` is not a whole number of steps greater than 0", count.trim())),
-        };
+    let counts: [(&str, fn(u64) -> Interval); 2] = [("step", Interval::Steps), ("increment", Interval::Increments)];
+    for (word, interval) in counts {
+        if let Some(count) = trimmed.trim_end_matches('s').strip_suffix(word) {
+            return match count.trim().parse::<u64>() {
+                Ok(count) if count > 0 => Ok(interval(count)),
+                _ => Err(format!("`{}` is not a whole number of {word}s greater than 0", count.trim())),
+            };
+        }
     }
     if trimmed.parse::<f64>().is_ok() {
         return Err("a unit is missing: seconds or steps?".to_owned());

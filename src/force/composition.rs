@@ -72,6 +72,11 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
         self.rolling.prepare(time_step);
     }
 
+    fn relax(&mut self) {
+        self.normal.relax();
+        self.tangential.relax();
+    }
+
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L> {
         let (normal_memory, rest) = memory.split_at_mut(N::MEMORY);

@@ -147,6 +147,9 @@ pub trait NormalLaw: Copy + Send + Sync + 'static {
     }
     /// Recompute what depends on the time step \[s\]; called before the first touch and whenever it changes.
     fn prepare(&mut self, time_step: f64);
+    /// After `prepare`: the relaxed limit of a law that depends on rate, for the quasi-static routine, where time has no
+    /// meaning and every process is infinitely slow. A rate-independent law has nothing to do.
+    fn relax(&mut self) {}
     /// Force of one touch; `memory` has `MEMORY` entries, all zero at first touch.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
 }
@@ -159,6 +162,8 @@ pub trait TangentialLaw: Copy + Send + Sync + 'static {
     fn columns(&self) -> Vec<Column>;
     /// Recompute what depends on the time step \[s\].
     fn prepare(&mut self, time_step: f64);
+    /// The relaxed limit, see [`NormalLaw::relax`].
+    fn relax(&mut self) {}
     /// Force of one touch.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
 }
@@ -209,6 +214,8 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     fn columns(&self) -> Vec<Column>;
     /// Recompute what depends on the time step \[s\].
     fn prepare(&mut self, time_step: f64);
+    /// The relaxed limit, see [`NormalLaw::relax`].
+    fn relax(&mut self) {}
     /// Forces of one touch; `memory` has `MEMORY` entries.
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L>;
 }

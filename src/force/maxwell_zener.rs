@@ -193,6 +193,13 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
         }
     }
 
+    /// The limit Δt/τ → ∞: no branch holds anything, Hertz with E_∞ is left.
+    fn relax(&mut self) {
+        for k in (0..BRANCHES).filter(|&k| self.rate[k] > 0.0) {
+            (self.decay[k], self.gain[k]) = (0.0, 0.0);
+        }
+    }
+
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
         let (radius, overlap, last) = (touch.effective_radius, touch.overlap, memory[0]);

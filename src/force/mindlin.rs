@@ -139,6 +139,12 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         }
     }
 
+    fn relax(&mut self) {
+        for k in (0..SPRINGS).filter(|&k| self.rate[k] > 0.0) {
+            (self.decay[k], self.weight[k]) = (0.0, 0.0);
+        }
+    }
+
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
         let zero = L::splat(0.0);

@@ -90,8 +90,8 @@ pub type Excess = Option<(usize, f64)>;
 
 /// The pass of one pair of materials.
 pub trait PairPass: Send + Sync {
-    /// Recompute what depends on the time step \[s\].
-    fn prepare(&mut self, time_step: f64);
+    /// Recompute what depends on the time step \[s\]; `relaxed`: in the limit of infinitely slow processes.
+    fn prepare(&mut self, time_step: f64, relaxed: bool);
     /// Memory columns.
     fn columns(&self) -> Vec<Column>;
     /// Numbers per output line that this law needs.
@@ -137,8 +137,11 @@ pub fn build(pair: &PairConfig, ellipsoids: bool) -> Box<dyn PairPass> {
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
-    fn prepare(&mut self, time_step: f64) {
+    fn prepare(&mut self, time_step: f64, relaxed: bool) {
         self.law.prepare(time_step);
+        if relaxed {
+            self.law.relax();
+        }
     }
 
     fn columns(&self) -> Vec<Column> {

@@ -30,7 +30,8 @@ pub struct Measured {
 impl TimeStepControl {
     /// Stiffness that the fastest particles can reach in a head-on impact: with `K = K_r √(δ/δ_r)`
     /// the spring takes up `½ m v²` at `δ^{5/2} = (15/8) m v² √δ_r/K_r`.
-    fn impact_stiffness(&self, speed: f64) -> f64 {
+    #[must_use]
+    pub fn impact_stiffness(&self, speed: f64) -> f64 {
         if speed == 0.0 || !self.max_mass.is_finite() || self.reference_stiffness == 0.0 {
             return 0.0;
         }

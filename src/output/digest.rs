@@ -99,6 +99,7 @@ pub(crate) mod tests {
             snapshots: 2,
             measured_stress: [1.0e6, -2.5e-3, 7.0],
             particles: u64::from(count),
+            quasi_static: None,
         };
         let mut particles = Vec::new();
         let mut memory = ContactMemory::new(3);

@@ -51,6 +51,8 @@ pub struct HistoryRow {
     pub max_overlap_ratio: f64,
     /// Fabric tensor.
     pub fabric: [f64; 6],
+    /// Equilibria that quasi-static stages have found so far.
+    pub increment: u64,
 }
 
 /// Column names in the order of [`HistoryRow::values`].
@@ -67,6 +69,7 @@ pub fn columns() -> Vec<String> {
     names.extend(LEDGER.map(|entry| format!("{entry}_J")));
     names.extend(["unbalanced_ratio", "max_overlap_ratio"].map(String::from));
     names.extend(TENSOR.map(|part| format!("fabric_{part}")));
+    names.push("increment".to_owned());
     names
 }
 
@@ -97,6 +100,7 @@ impl HistoryRow {
         reals(&self.ledger);
         reals(&[self.unbalanced_ratio, self.max_overlap_ratio]);
         reals(&self.fabric);
+        cells.push(Cell::Count(self.increment));
         cells
     }
 
@@ -138,6 +142,7 @@ impl HistoryRow {
         for part in [&mut row.unbalanced_ratio, &mut row.max_overlap_ratio].into_iter().chain(&mut row.fabric) {
             *part = real(word())?;
         }
+        row.increment = count(word())?;
         Ok(row)
     }
 }
@@ -264,6 +269,7 @@ mod tests {
             ledger: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0],
             max_overlap_ratio: 0.1,
             fabric: [6.0, 5.0, 4.0, 3.0, 2.0, 1.0],
+            increment: 2 * step,
             ..HistoryRow::default()
         }
     }

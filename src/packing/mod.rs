@@ -1,12 +1,14 @@
 //! Initial state: sizes, positions and velocities of all particles, by id. Made by one process, serially
 //! and from counter-based random numbers; knows nothing of ranks.
 
+pub mod ellipsoids;
 pub mod file;
 pub mod grid;
 pub mod overlap;
 pub mod radii;
 pub mod random;
 pub mod rcp;
+pub mod relaxation;
 pub mod replicate;
 pub mod tournament;
 
@@ -15,7 +17,9 @@ mod test_input;
 
 use crate::config::{Boundary, CellConfig, Config, Motion, PackingConfig, Species};
 use crate::error::{Error, Result};
+use crate::state::shape::{UPRIGHT, bounding_radius, ellipsoid_volume, is_sphere};
 use crate::state::{LEDGER, ParticleState};
+use ellipsoids::Body;
 use grid::{Ball, Cell};
 use random::{Draws, Purpose};
 
@@ -40,6 +44,7 @@ pub fn build(config: &Config) -> Result<Packing> {
         PackingConfig::RandomClose { contraction_rate, max_moves_per_particle } => {
             random_close(config, *contraction_rate, *max_moves_per_particle)?
         }
+        PackingConfig::Relaxation { tolerance, max_steps } => relaxed(config, *tolerance, *max_steps)?,
         PackingConfig::File { path } => from_file(config, path)?,
     };
     if packing.particles.is_empty() {
@@ -51,14 +56,19 @@ pub fn build(config: &Config) -> Result<Packing> {
             packing.particles.len()
         )));
     }
-    let balls: Vec<Ball> = packing
-        .particles
-        .iter()
-        .map(|particle| Ball { position: particle.position, radius: particle.radius })
-        .collect();
-    let cell = Cell { sides: packing.sides, periodic: periodic_axes(&config.cell) };
-    check_overlaps(&balls, &cell, config.max_overlap_fraction)?;
+    check(config, &packing)?;
     Ok(packing)
+}
+
+fn check(config: &Config, packing: &Packing) -> Result<()> {
+    let (particles, allowed) = (&packing.particles, config.max_overlap_fraction);
+    let cell = Cell { sides: packing.sides, periodic: periodic_axes(&config.cell) };
+    if particles.iter().all(|particle| is_sphere(particle.semi_axes)) {
+        let ball = |particle: &ParticleState| Ball { position: particle.position, radius: particle.radius };
+        return check_overlaps(&particles.iter().map(ball).collect::<Vec<_>>(), &cell, allowed);
+    }
+    let body = |particle: &ParticleState| Body::new(particle.position, particle.semi_axes, particle.orientation);
+    ellipsoids::check_overlaps(&particles.iter().map(body).collect::<Vec<_>>(), &cell, allowed)
 }
 
 /// Ids are 32 bits wide and walls are numbered after the particles.
@@ -73,7 +83,7 @@ fn random_close(config: &Config, contraction_rate: f64, max_moves_per_particle: 
     if sized.is_empty() {
         return Err(Error::Packing("there are no particles to pack; give a species a count above 0".into()));
     }
-    let radii: Vec<f64> = sized.iter().map(|one| one.radius).collect();
+    let radii: Vec<f64> = sized.iter().map(|one| one.semi_axes[0]).collect();
     let shape = Cell { sides: config.cell.sides.unwrap_or(config.cell.aspect), periodic: periodic_axes(&config.cell) };
     let solid_fraction = if config.cell.sides.is_some() {
         Some(rcp::solid_volume(&radii) / shape.volume())
@@ -95,10 +105,47 @@ fn random_close(config: &Config, contraction_rate: f64, max_moves_per_particle: 
         .enumerate()
         .map(|(id, (one, position))| {
             let position = [0, 1, 2].map(|k| rcp::wrap(position[k], sides[k]));
-            at_rest_in_its_species(config, id, one.species, position, one.radius)
+            at_rest_in_its_species(config, id, one.species, position, one.semi_axes)
         })
         .collect();
     Ok(Packing { sides, particles })
+}
+
+fn relaxed(config: &Config, tolerance: f64, max_steps: usize) -> Result<Packing> {
+    let sized = radii::draw_radii(config.seed, &config.species)?;
+    if sized.is_empty() {
+        return Err(Error::Packing("there are no particles to pack; give a species a count above 0".into()));
+    }
+    let semi_axes: Vec<[f64; 3]> = sized.iter().map(|one| one.semi_axes).collect();
+    let orientations: Vec<[f64; 4]> = (0..sized.len()).map(|id| random_orientation(config.seed, id)).collect();
+    let solid: f64 = semi_axes.iter().map(|axes| ellipsoid_volume(*axes)).sum();
+    let of_sides = config.cell.sides.map(|sides| solid / (sides[0] * sides[1] * sides[2]));
+    let packed = relaxation::pack(&relaxation::Request {
+        semi_axes: &semi_axes,
+        orientations: &orientations,
+        aspect: config.cell.sides.unwrap_or(config.cell.aspect),
+        solid_fraction: of_sides.or(config.cell.solid_fraction),
+        seed: config.seed,
+        tolerance,
+        max_steps,
+    })?;
+    let sides = config.cell.sides.unwrap_or(packed.sides);
+    let particles = (0..sized.len())
+        .map(|id| {
+            let position = [0, 1, 2].map(|k| rcp::wrap(packed.positions[id][k], sides[k]));
+            let mut particle = at_rest_in_its_species(config, id, sized[id].species, position, semi_axes[id]);
+            if !is_sphere(semi_axes[id]) {
+                particle.orientation = packed.orientations[id];
+            }
+            particle
+        })
+        .collect();
+    Ok(Packing { sides, particles })
+}
+
+/// Uniform over all rotations.
+fn random_orientation(seed: u64, id: usize) -> [f64; 4] {
+    Draws::new(seed, Purpose::Orientation, id as u64).rotation()
 }
 
 fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
@@ -110,7 +157,9 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
         .enumerate()
         .map(|(id, row)| {
             check_density(config, id, &row).map_err(|message| Error::File { path: path.to_owned(), message })?;
-            let mut particle = at_rest_in_its_species(config, id, row.species, row.position, row.radius);
+            let semi_axes = row.semi_axes.unwrap_or([row.radius; 3]);
+            let mut particle = at_rest_in_its_species(config, id, row.species, row.position, semi_axes);
+            particle.orientation = row.orientation.unwrap_or(particle.orientation);
             // What is prescribed stays prescribed, whatever the file says.
             if config.species[row.species as usize].motion == Motion::Free {
                 particle.velocity = row.velocity.unwrap_or(particle.velocity);
@@ -140,7 +189,13 @@ fn check_density(config: &Config, id: usize, row: &file::Row) -> std::result::Re
 }
 
 /// A particle with the initial velocity and spin of its species and nothing behind it.
-fn at_rest_in_its_species(config: &Config, id: usize, species: u32, position: [f64; 3], radius: f64) -> ParticleState {
+fn at_rest_in_its_species(
+    config: &Config,
+    id: usize,
+    species: u32,
+    position: [f64; 3],
+    semi_axes: [f64; 3],
+) -> ParticleState {
     let of_species = &config.species[species as usize];
     let (velocity, spin) = match of_species.motion {
         Motion::Driven { velocity, spin } => (velocity, spin),
@@ -150,13 +205,13 @@ fn at_rest_in_its_species(config: &Config, id: usize, species: u32, position: [f
         id: id as u32,
         species,
         position,
-        radius,
-        semi_axes: [radius; 3],
+        radius: bounding_radius(semi_axes),
+        semi_axes,
         velocity,
         full_velocity: velocity,
         spin,
         full_spin: spin,
-        orientation: [1.0, 0.0, 0.0, 0.0],
+        orientation: UPRIGHT,
         ledger: [0.0; LEDGER.len()],
         image: [0; 3],
         reserved: 0,

@@ -12,11 +12,11 @@ const MAX_REDRAWS: usize = 10_000;
 pub struct Sized {
     /// Index into [`crate::config::Config::species`].
     pub species: u32,
-    /// Radius \[m\].
-    pub radius: f64,
+    /// Semi-axes \[m\]; the radius three times for a sphere.
+    pub semi_axes: [f64; 3],
 }
 
-/// Species and radius \[m\] of every particle; ids run from 0 through the species in input order.
+/// Species and semi-axes \[m\] of every particle; ids run from 0 through the species in input order.
 ///
 /// # Errors
 /// [`Error::Packing`] if a distribution gives no usable radius: its cut leaves (almost) nothing of
@@ -29,7 +29,9 @@ pub fn draw_radii(seed: u64, species: &[Species]) -> Result<Vec<Sized>> {
             let radius = draw(&one.radius, &mut draws)
                 .filter(|radius| radius.is_finite() && *radius > 0.0)
                 .ok_or_else(|| unusable(&one.name, &one.radius))?;
-            particles.push(Sized { species: index as u32, radius });
+            let mut ratios = Draws::new(seed, Purpose::Shape, particles.len() as u64);
+            let semi_axes = one.shape.semi_axes(radius, || ratios.uniform());
+            particles.push(Sized { species: index as u32, semi_axes });
         }
     }
     Ok(particles)
@@ -79,10 +81,11 @@ fn unusable(name: &str, distribution: &RadiusDistribution) -> Error {
 mod tests {
     use super::super::test_input::species;
     use super::*;
+    use crate::config::ShapeConfig;
 
     fn radii(distribution: RadiusDistribution, count: usize) -> Vec<f64> {
         let drawn = draw_radii(3, &[species("a", count, distribution)]).unwrap();
-        drawn.iter().map(|one| one.radius).collect()
+        drawn.iter().map(|one| one.semi_axes[0]).collect()
     }
 
     #[test]
@@ -92,7 +95,7 @@ mod tests {
             species("none", 0, RadiusDistribution::Fixed(5.0)),
             species("large", 2, RadiusDistribution::Fixed(2.0)),
         ];
-        let drawn: Vec<_> = draw_radii(0, &list).unwrap().iter().map(|one| (one.species, one.radius)).collect();
+        let drawn: Vec<_> = draw_radii(0, &list).unwrap().iter().map(|one| (one.species, one.semi_axes[0])).collect();
         assert_eq!(drawn, [(0, 1.0), (0, 1.0), (0, 1.0), (2, 2.0), (2, 2.0)]);
     }
 
@@ -100,6 +103,20 @@ mod tests {
     fn a_radius_depends_on_the_id_alone() {
         let normal = RadiusDistribution::Normal { mean: 1.0, deviation: 0.2, min: 0.5, max: 1.5 };
         assert_eq!(radii(normal.clone(), 10), radii(normal, 100)[..10]);
+    }
+
+    #[test]
+    fn ratios_are_drawn_per_particle_and_keep_the_volume() {
+        let mut given = species("a", 5000, RadiusDistribution::Fixed(2.0));
+        given.shape = ShapeConfig::AspectRatios { b_to_a: [0.5, 1.0], c_to_a: [0.4, 0.4] };
+        let drawn = draw_radii(3, &[given]).unwrap();
+        let mut mean = 0.0;
+        for one in &drawn {
+            let [a, b, c] = one.semi_axes;
+            assert!((a * b * c - 8.0).abs() < 1e-12 && (0.5..1.0).contains(&(b / a)) && (c / a - 0.4).abs() < 1e-12);
+            mean += b / a / 5000.0;
+        }
+        assert!((mean - 0.75).abs() < 0.01, "{mean}");
     }
 
     #[test]

@@ -16,6 +16,10 @@ pub enum Purpose {
     Velocity = 3,
     /// Displacements of a replicated packing.
     Perturbation = 4,
+    /// Ratios of semi-axes.
+    Shape = 5,
+    /// Initial orientations.
+    Orientation = 6,
 }
 
 /// The sequence of random numbers of one particle for one purpose.
@@ -51,6 +55,16 @@ impl Draws {
     pub fn uniform(&mut self) -> f64 {
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.generator.next_u64() >> 11) as f64 * STEP
+    }
+
+    /// The next rotation, uniform over all of them, as a unit quaternion (w, x, y, z); takes three draws
+    /// (Shoemake 1992).
+    pub fn rotation(&mut self) -> [f64; 4] {
+        let share = self.uniform();
+        let [first, second] = [0; 2].map(|_| 2.0 * std::f64::consts::PI * self.uniform());
+        let (low, high) = ((1.0 - share).sqrt(), share.sqrt());
+        let (sin, cos) = (libm::sin, libm::cos);
+        crate::state::shape::normalised([low * sin(first), low * cos(first), high * sin(second), high * cos(second)])
     }
 
     /// The next number of the standard normal distribution (Box–Muller, the cosine branch).

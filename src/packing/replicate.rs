@@ -6,6 +6,7 @@ use super::{MAX_PARTICLES, Packing, initial_velocity, periodic_axes, rcp};
 use crate::config::{Config, Motion};
 use crate::error::{Error, Result};
 use crate::state::ParticleState;
+use crate::state::shape::smallest_semi_axis;
 use std::ops::Range;
 
 /// Number of particles of all copies of a packing with `base` particles.
@@ -39,7 +40,7 @@ pub fn share(config: &Config, base: &Packing, ids: Range<u64>) -> Vec<ParticleSt
         let original = &base.particles[(id % count) as usize];
         let [x, y, _] = replication.copies;
         let place = [copy % x, copy / x % y, copy / x / y];
-        let moved = displacement(config, id, original.radius);
+        let moved = displacement(config, id, smallest_semi_axis(original.semi_axes));
         let position = [0, 1, 2].map(|k| {
             let coordinate = original.position[k] + place[k] as f64 * base.sides[k] + moved[k];
             if periodic[k] { rcp::wrap(coordinate, whole[k]) } else { coordinate }
@@ -54,7 +55,7 @@ pub fn share(config: &Config, base: &Packing, ids: Range<u64>) -> Vec<ParticleSt
     .collect()
 }
 
-/// Uniformly distributed in a ball of `perturbation` times the radius \[m\].
+/// Uniformly distributed in a ball of `perturbation` times the radius (smallest semi-axis) \[m\].
 fn displacement(config: &Config, id: u64, radius: f64) -> [f64; 3] {
     let largest = config.replication.perturbation * radius;
     if largest == 0.0 {

@@ -1,7 +1,7 @@
 //! What a run writes while it goes: history, snapshots, the terminal, the tables at its end.
 
 use super::efforts::{Efforts, resident_bytes};
-use crate::config::{AxisControl, Config, Interval};
+use crate::config::{self, AxisControl, Config, Interval, Routine};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
 use crate::force::observe::Wanted;
@@ -11,7 +11,7 @@ use crate::output::history::HistoryWriter;
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
 use crate::output::plot;
 use crate::output::ranks::{effort_table, rank_table};
-use crate::output::snapshot::{Moment, SnapshotSeries};
+use crate::output::snapshot::{Moment, SnapshotSeries, Style};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
 use std::fs;
@@ -107,7 +107,10 @@ impl RunOutput {
         };
         let history = agree(comm, opened)?;
         let snapshots = match config.output.snapshots {
-            Some(_) => Some(SnapshotSeries::resume(comm, directory, global.snapshots)?),
+            Some(_) => {
+                let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
+                Some(SnapshotSeries::resume(comm, directory, global.snapshots, style)?)
+            }
             None => None,
         };
         Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new), efforts })
@@ -223,9 +226,14 @@ impl RunOutput {
     }
 }
 
-/// Share of the run that is done, as far as durations, strains and steps of the stages tell.
+/// Share of the run that is done, as far as durations, strains, increments and steps of the stages tell.
 fn progress(config: &Config, global: &GlobalState) -> f64 {
-    let length = |stage: &crate::config::Stage| {
+    if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
+        // There is no common measure of length: one stage counts like another.
+        let current = config.stages.get(global.stage).map_or(0.0, |stage| progress_of(stage, global));
+        return (global.stage as f64 + current) / config.stages.len() as f64;
+    }
+    let length = |stage: &config::Stage| {
         let by_strain = stage.until_strain.and_then(|(axis, strain)| match stage.axes[axis] {
             AxisControl::StrainRate(rate) if rate != 0.0 => Some((strain / rate).abs()),
             _ => None,
@@ -240,6 +248,19 @@ fn progress(config: &Config, global: &GlobalState) -> f64 {
     if steps > 0 { global.step as f64 / steps as f64 } else { 0.0 }
 }
 
+/// Share of one stage that is done: that of the end condition which is nearest.
+fn progress_of(stage: &config::Stage, global: &GlobalState) -> f64 {
+    let by_time = stage.duration.map(|duration| (global.time - global.stage_start_time) / duration);
+    let by_strain = stage.until_strain.map(|(axis, target)| {
+        let start = global.stage_start_strain[axis];
+        (global.strain[axis] - start) / (target - start)
+    });
+    let by_steps = stage.steps.map(|steps| (global.step - global.stage_start_step) as f64 / steps as f64);
+    let done = global.quasi_static.map_or(0, |state| state.increments - state.stage_start_increments);
+    let by_increments = stage.increments.map(|increments| done as f64 / increments as f64);
+    [by_time, by_strain, by_steps, by_increments].into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0)
+}
+
 fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {
     let [neighbours, contacts, step, observe, halo, reduce, output] = timers.seconds();
     StageTimes { neighbours, contacts, step, observe, halo, reduce, output, total: wall.as_secs_f64() }
@@ -252,5 +273,7 @@ pub fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
         Interval::Steps(steps) => global.step >= written * steps,
         // A hair early, so that rounding of the time does not cost a step.
         Interval::Time(time) => global.time >= written as f64 * time * (1.0 - 1e-9),
+        // Only equilibria count; the dynamic routine shows its first state.
+        Interval::Increments(_) => written == 0,
     }
 }

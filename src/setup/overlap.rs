@@ -9,6 +9,7 @@ use crate::packing::grid::{Ball, Cell};
 use crate::packing::overlap::{check_against_faces, worst_overlap};
 use crate::packing::periodic_axes;
 use crate::state::particles::Particles;
+use crate::state::shape::smallest_semi_axis;
 
 /// The cell, and who owns what.
 pub struct Space<'a> {
@@ -35,7 +36,8 @@ pub fn largest(
     let cell = Cell { sides: space.sides, periodic: periodic_axes(&space.config.cell) };
     let ball = |particles: &Particles, index: usize| Ball {
         position: particles.record[index].position,
-        radius: particles.record[index].radius,
+        // Of an ellipsoid the sphere inside it: what more of it overlaps the first step finds.
+        radius: smallest_semi_axis(particles.semi_axes(index)),
     };
     let own = (0..particles.owned).map(|index| (particles.id[index], ball(particles, index)));
     agree(comm, check_against_faces(own, &cell, allowed))?;

@@ -3,6 +3,7 @@
 
 mod fault;
 mod lists;
+mod relaxation;
 mod report;
 mod snapshot;
 mod strips;
@@ -114,7 +115,7 @@ pub struct Simulation {
     timers: Timers,
     threads: usize,
     max_stiffness: f64,
-    prepared_for: f64,
+    prepared_for: Option<(u64, bool)>,
     warned_about_time_step: bool,
     warnings: Vec<String>,
 }
@@ -161,7 +162,7 @@ impl Simulation {
             timers: Timers::default(),
             threads,
             max_stiffness: 0.0,
-            prepared_for: f64::NAN,
+            prepared_for: None,
             warned_about_time_step: false,
             warnings: model.cautions.clone(),
             model,
@@ -256,7 +257,14 @@ impl Simulation {
             self.look(wanted, control, each)?;
         }
         let plan = self.model.programme.plan(&self.global, self.global.time_step);
+        if self.is_quasi_static() {
+            self.begin_increment();
+        }
+        let strain = self.global.strain;
         let (moved, fault) = self.move_on(&plan, looking);
+        if self.is_quasi_static() {
+            self.after_substep(strain);
+        }
         self.agree_on_step(fault, &moved, requests)
     }
 
@@ -295,8 +303,9 @@ impl Simulation {
     }
 
     fn control_is_due(&self) -> bool {
-        self.global.step.is_multiple_of(self.model.config.control_interval)
-            || self.global.step == self.global.stage_start_step
+        !self.is_quasi_static()
+            && (self.global.step.is_multiple_of(self.model.config.control_interval)
+                || self.global.step == self.global.stage_start_step)
     }
 
     /// Present motion of the cell.
@@ -331,11 +340,11 @@ impl Simulation {
 
     /// Let the laws know the time since the last evaluation.
     fn prepare(&mut self) {
-        let elapsed = self.global.previous_time_step;
-        if elapsed.to_bits() != self.prepared_for.to_bits() {
-            self.prepared_for = elapsed;
+        let (elapsed, relaxed) = (self.global.previous_time_step, self.is_quasi_static());
+        if self.prepared_for != Some((elapsed.to_bits(), relaxed)) {
+            self.prepared_for = Some((elapsed.to_bits(), relaxed));
             for pass in &mut self.model.passes {
-                pass.prepare(elapsed);
+                pass.prepare(elapsed, relaxed);
             }
         }
     }
@@ -431,7 +440,8 @@ impl Simulation {
             scale: if kinematics == Kinematics::Bct { [0, 1, 2].map(|k| sides[k] / old[k]) } else { [1.0; 3] },
             sides,
             reference_sides: self.budget.reference_sides,
-            face_velocity: if kinematics == Kinematics::Bc {
+            // In the quasi-static routine the face jumps and then rests, and so does what goes through it.
+            face_velocity: if kinematics == Kinematics::Bc && !self.is_quasi_static() {
                 [0, 1, 2].map(|k| (sides[k] - old[k]) / plan.time_step)
             } else {
                 [0.0; 3]

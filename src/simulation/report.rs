@@ -39,6 +39,10 @@ pub struct Report {
     pub wall_force: [f64; 6],
     /// For the time step.
     pub measured: Measured,
+    /// Mean of the net forces on free particles \[N\].
+    pub mean_net_force: f64,
+    /// Mean contact force \[N\]; 0 before anything touches.
+    pub mean_contact_force: f64,
 }
 
 impl Simulation {
@@ -63,6 +67,7 @@ impl Simulation {
         let ends = 2.0 * contacts + wall_contacts;
         let bearing = particles - values[ParticleSum::Rattlers as usize];
         let free = values[ParticleSum::Free as usize];
+        let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
         let row = HistoryRow {
             step: self.global.step,
             time: self.global.time,
@@ -87,6 +92,7 @@ impl Simulation {
                 / (values[Sum::ForceMagnitude as usize] / (contacts + wall_contacts)),
             max_overlap_ratio: largest[1],
             fabric: six(Sum::Fabric as usize, contacts),
+            increment: self.global.quasi_static.map_or(0, |state| state.increments),
         };
         self.timers.stop();
         Report {
@@ -94,6 +100,8 @@ impl Simulation {
             samples: observation.samples,
             wall_force: std::array::from_fn(|k| values[Sum::WallForce as usize + k]),
             measured: Measured { max_stiffness: largest[0], max_speed: largest[2] },
+            mean_net_force: mean(values[ParticleSum::NetForce as usize], free),
+            mean_contact_force: mean(values[Sum::ForceMagnitude as usize], contacts + wall_contacts),
         }
     }
 

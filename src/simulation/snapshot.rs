@@ -25,6 +25,7 @@ impl Simulation {
                     species: self.particles.species[index],
                     position: record.position,
                     radius: record.radius,
+                    semi_axes: self.particles.semi_axes(index),
                     orientation: self.particles.orientation_of(index),
                     velocity: record.velocity,
                     angular_velocity: record.spin,

@@ -140,4 +140,22 @@ pub struct GlobalState {
     pub measured_stress: [f64; 3],
     /// Number of particles.
     pub particles: u64,
+    /// Progress of the quasi-static routine; absent until a quasi-static stage begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quasi_static: Option<QuasiStaticState>,
+}
+
+/// Where the quasi-static routine is.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct QuasiStaticState {
+    /// Increments that have reached equilibrium since the start of the run.
+    pub increments: u64,
+    /// Increments when the current stage began.
+    pub stage_start_increments: u64,
+    /// Substeps of the running increment; 0: its strain is not applied yet.
+    pub substep: u64,
+    /// Present mixing of velocities and forces (FIRE).
+    pub mixing: f64,
+    /// Substeps since the last uphill motion (FIRE).
+    pub downhill: u64,
 }

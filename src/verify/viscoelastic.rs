@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 use crate::force::observe::Wanted;
 use std::fmt::Write as _;
 
-const RATES: &str = include_str!("../../tests/data/maxwell_zener_rates.csv");
-const RELAXATION: &str = include_str!("../../tests/data/maxwell_zener_relaxation.csv");
+pub const RATES: &str = include_str!("../../tests/data/maxwell_zener_rates.csv");
+pub const RELAXATION: &str = include_str!("../../tests/data/maxwell_zener_relaxation.csv");
 
 const RADIUS: f64 = 5e-6;
 /// The bound that the law must keep at the automatic time step.

@@ -6,6 +6,7 @@ use crate::units::Dimension;
 
 use Default::{Absent, Derived, Required};
 
+const RATIO: Kind = Kind::Numbers(Dimension::NONE, Range::POSITIVE);
 const LENGTH: Kind = number(Dimension::LENGTH, Range::POSITIVE);
 
 /// `[[material]]`.
@@ -73,7 +74,20 @@ pub static SPECIES: Table = Table {
     keys: &[
         key("name", Kind::Text, Required, "Name, as in a particle file."),
         key("material", Kind::Text, Required, "Name of its material."),
-        key("radius", Kind::OneOf(&RADIUS, Some("fixed")), Required, "Radius or distribution of radii."),
+        key(
+            "radius",
+            Kind::OneOf(&RADIUS, Some("fixed")),
+            Absent,
+            "Radius or distribution of radii; of ellipsoids the radius of the sphere of equal volume. Needed without \
+             `semi_axes`.",
+        ),
+        key(
+            "semi_axes",
+            Kind::Axes { dimension: Dimension::LENGTH, range: Range::POSITIVE, uniform: false },
+            Absent,
+            "Semi-axes of ellipsoids that are all alike, instead of `radius`. Orientations are random.",
+        ),
+        key("aspect_ratios", Kind::Table(&ASPECT_RATIOS), Absent, "Makes the particles ellipsoids."),
         key("count", Kind::Integer(1), Absent, "Number of particles."),
         key("fraction", number(Dimension::NONE, Range::FRACTION), Absent, "Share of all particles, by number."),
         key("motion", Kind::OneOf(&MOTION, None), Default::Word("free"), "What moves it."),
@@ -85,6 +99,16 @@ pub static SPECIES: Table = Table {
             "Standard deviation of a random normal part of each velocity component.",
         ),
         key("spin", axes(Dimension::RATE, false), ZERO, "Initial angular velocity."),
+    ],
+};
+
+/// `[species.aspect_ratios]`.
+static ASPECT_RATIOS: Table = Table {
+    meaning: "Ratios of the semi-axes a, b, c of ellipsoids with the volume of a sphere of the given radius; drawn per \
+              particle. Orientations are random.",
+    keys: &[
+        key("b_to_a", RATIO, Required, "b/a: [one ratio], or [smallest, largest] of a uniform distribution."),
+        key("c_to_a", RATIO, Required, "c/a, likewise."),
     ],
 };
 

@@ -22,7 +22,7 @@ const SIZE: (u32, u32) = (1200, 800);
 const PNG_SCALE: u32 = 2;
 /// Points of so short a curve are marked.
 const MARKED_POINTS: usize = 16;
-const FONT: &str = "sans-serif";
+pub(super) const FONT: &str = "sans-serif";
 /// Distinct also for colour-blind readers (Okabe and Ito, Color Universal Design, 2008).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
@@ -56,7 +56,8 @@ pub fn draw_curves(path: &Path, title: &str, x_label: &str, y_label: &str, curve
     drawn.map_err(|reason| fault(format!("cannot draw the picture: {reason}")))
 }
 
-fn provide_font() -> std::result::Result<(), ()> {
+/// Make the embedded font known to the drawing library, once.
+pub(super) fn provide_font() -> std::result::Result<(), ()> {
     static REGISTERED: OnceLock<std::result::Result<(), ()>> = OnceLock::new();
     *REGISTERED.get_or_init(|| register_font(FONT, FontStyle::Normal, ttf_noto_sans::REGULAR).map_err(|_| ()))
 }
@@ -172,6 +173,12 @@ fn legend_position(bounds: &Bounds, curves: &[Curve]) -> SeriesLabelPosition {
     };
     let freest = corners.into_iter().min_by_key(|(_, corner)| crowd(*corner));
     freest.map_or(SeriesLabelPosition::UpperRight, |(position, _)| position)
+}
+
+/// Text of a tick on an axis with this range.
+pub(super) fn axes_text(range: [f64; 2]) -> impl Fn(f64) -> String {
+    let digits = tick_digits(range);
+    move |value| tick(value, digits)
 }
 
 /// Decimals that tell neighbouring ticks apart.

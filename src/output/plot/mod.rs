@@ -1,8 +1,10 @@
 //! Pictures of a run from its history table, as SVG and PNG. Reads files only.
 
 mod draw;
+mod panel;
 
 pub use draw::{Curve, draw_curves};
+pub use panel::{Corner, Ink, Panel, Series, Style, draw_panel};
 
 use super::files::create_folder;
 use super::history::{self, HistoryRow};

@@ -16,9 +16,14 @@ pub(super) fn contact_file(number: usize) -> String {
     format!("contacts-{number:06}.vtkhdf")
 }
 
+pub(super) fn dump_file(number: usize) -> String {
+    format!("particles-{number:06}.dump")
+}
+
 /// Number of a snapshot file, complete or not; `None` for other files.
 pub(super) fn number_of(name: &str) -> Option<usize> {
-    let name = name.strip_suffix(".part").unwrap_or(name).strip_suffix(".vtkhdf")?;
+    let name = name.strip_suffix(".part").unwrap_or(name);
+    let name = name.strip_suffix(".vtkhdf").or_else(|| name.strip_suffix(".dump"))?;
     let digits = name.strip_prefix("particles-").or_else(|| name.strip_prefix("contacts-"))?;
     digits.parse().ok()
 }
@@ -97,20 +102,20 @@ fn first_grids(text: &str, count: usize) -> String {
 ///
 /// # Errors
 /// [`Error::File`] when it cannot be written.
-pub(super) fn write_xdmf(folder: &Path, times: &[f64], total: u64) -> Result<()> {
+pub(super) fn write_xdmf(folder: &Path, times: &[f64], total: u64, ellipsoids: bool) -> Result<()> {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n    \
          <Grid Name=\"particles\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
     );
     for (number, &time) in times.iter().enumerate() {
         // Writing to a string cannot fail.
-        let _ = write_grid(&mut text, &particle_file(number), time, total);
+        let _ = write_grid(&mut text, &particle_file(number), time, total, ellipsoids);
     }
     text.push_str(TAIL);
     write_atomically(&folder.join("particles.xmf"), text.as_bytes())
 }
 
-fn write_grid(text: &mut String, file: &str, time: f64, total: u64) -> std::fmt::Result {
+fn write_grid(text: &mut String, file: &str, time: f64, total: u64, ellipsoids: bool) -> std::fmt::Result {
     writeln!(text, "      <Grid Name=\"{file}\" GridType=\"Uniform\">")?;
     writeln!(text, "        <Time Value=\"{time:?}\"/>")?;
     writeln!(
@@ -126,6 +131,7 @@ fn write_grid(text: &mut String, file: &str, time: f64, total: u64) -> std::fmt:
         )
     };
     writeln!(text, "        <Geometry GeometryType=\"XYZ\">{}</Geometry>", item("Float", 3, "Points"))?;
+    let shapes = [("semi_axes", "Vector", "Float", 3), ("shape_tensor", "Tensor", "Float", 9)];
     for (name, kind, number, columns) in [
         ("id", "Scalar", "UInt", 1),
         ("species", "Scalar", "UInt", 1),
@@ -135,7 +141,10 @@ fn write_grid(text: &mut String, file: &str, time: f64, total: u64) -> std::fmt:
         ("angular_velocity", "Vector", "Float", 3),
         ("stress_trace", "Scalar", "Float", 1),
         ("coordination", "Scalar", "UInt", 1),
-    ] {
+    ]
+    .into_iter()
+    .chain(shapes.into_iter().filter(|_| ellipsoids))
+    {
         let item = item(number, columns, &format!("PointData/{name}"));
         writeln!(
             text,

@@ -2,6 +2,7 @@
 //! beside them. Particles in id order, contacts in key order. Knows nothing of how often they come.
 
 mod blocks;
+mod dump;
 mod index;
 mod vtkhdf;
 
@@ -24,8 +25,10 @@ pub struct SnapshotParticle {
     pub species: u32,
     /// Position, wrapped into the cell \[m\].
     pub position: [f64; 3],
-    /// Radius \[m\].
+    /// Radius; of an ellipsoid its largest semi-axis \[m\].
     pub radius: f64,
+    /// Semi-axes \[m\].
+    pub semi_axes: [f64; 3],
     /// Orientation, unit quaternion (w, x, y, z).
     pub orientation: [f64; 4],
     /// Velocity at the full step \[m/s\].
@@ -82,11 +85,21 @@ pub struct Moment {
     pub sides: [f64; 3],
 }
 
+/// What all snapshots of a run hold beside the usual arrays.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Style {
+    /// Semi-axes, and the tensor that draws ellipsoids: there are some.
+    pub ellipsoids: bool,
+    /// A LAMMPS text dump beside each snapshot.
+    pub dump: bool,
+}
+
 /// The snapshots of a run: `snapshots/` in its directory.
 pub struct SnapshotSeries {
     comm: Communicator,
     folder: PathBuf,
     times: Vec<f64>,
+    style: Style,
 }
 
 impl SnapshotSeries {
@@ -95,19 +108,19 @@ impl SnapshotSeries {
     ///
     /// # Errors
     /// [`crate::error::Error::File`] on every rank when old files cannot be removed.
-    pub fn create(comm: &Communicator, directory: &Path) -> Result<Self> {
-        Self::resume(comm, directory, 0)
+    pub fn create(comm: &Communicator, directory: &Path, style: Style) -> Result<Self> {
+        Self::resume(comm, directory, 0, style)
     }
 
     /// Go on after the first `count` snapshots of a run (restart), removing later ones. Collective.
     ///
     /// # Errors
     /// [`crate::error::Error::File`] on every rank when the index holds fewer or files cannot be removed.
-    pub fn resume(comm: &Communicator, directory: &Path, count: u64) -> Result<Self> {
+    pub fn resume(comm: &Communicator, directory: &Path, count: u64, style: Style) -> Result<Self> {
         let folder = directory.join("snapshots");
         let kept = if comm.rank() == 0 { keep_first(&folder, count) } else { Ok(Vec::new()) };
         let times = agree(comm, kept)?;
-        Ok(Self { comm: comm.clone(), folder, times: share(comm, &times) })
+        Ok(Self { comm: comm.clone(), folder, times: share(comm, &times), style })
     }
 
     /// Number of snapshots written.
@@ -132,7 +145,11 @@ impl SnapshotSeries {
         let number = self.times.len();
         let (first, particles) = blocks::particles_by_id(&self.comm, total, particles);
         let path = self.folder.join(index::particle_file(number));
-        vtkhdf::write_particles(&self.comm, &path, moment, total, first, &particles)?;
+        let block = vtkhdf::Block { total, first, particles: &particles, ellipsoids: self.style.ellipsoids };
+        vtkhdf::write_particles(&self.comm, &path, moment, &block)?;
+        if self.style.dump {
+            dump::write(&self.comm, &self.folder.join(index::dump_file(number)), moment, total, &particles)?;
+        }
         if let Some(contacts) = contacts {
             let contacts = blocks::contacts_by_key(&self.comm, total, contacts);
             vtkhdf::write_contacts(&self.comm, &self.folder.join(index::contact_file(number)), moment, &contacts)?;
@@ -148,7 +165,7 @@ impl SnapshotSeries {
         if self.folder.join(index::contact_file(self.times.len() - 1)).exists() {
             index::write_series(&self.folder, "contacts", &self.times, index::contact_file)?;
         }
-        index::write_xdmf(&self.folder, &self.times, total)
+        index::write_xdmf(&self.folder, &self.times, total, self.style.ellipsoids)
     }
 }
 

@@ -3,11 +3,15 @@ use crate::output::hdf5_file::Reader;
 
 const MOMENT: Moment = Moment { step: 12, time: 0.25, sides: [1.0, 2.0, 3.0] };
 
+/// Everything that a series can hold.
+const ALL: Style = Style { ellipsoids: true, dump: true };
+
 fn particles(count: u32) -> Vec<SnapshotParticle> {
     let of = |id: u32| SnapshotParticle {
         id,
         position: [f64::from(id), 0.5, 0.25],
         radius: 0.1 + f64::from(id),
+        semi_axes: [0.1 + f64::from(id), 0.05, 0.025],
         orientation: [1.0, 0.0, 0.0, 0.0],
         coordination: id % 7,
         ..SnapshotParticle::zeroed()
@@ -35,7 +39,7 @@ fn contacts(count: u32) -> SnapshotContacts {
 fn snapshot_holds_particles_in_id_order_and_contacts_as_lines() {
     let folder = tempfile::tempdir().expect("folder");
     let comm = Communicator::single();
-    let mut series = SnapshotSeries::create(&comm, folder.path()).expect("create");
+    let mut series = SnapshotSeries::create(&comm, folder.path(), Style::default()).expect("create");
     let path = series.write(&MOMENT, 10, particles(10), Some(contacts(9))).expect("write");
     let reader = Reader::open(&path).expect("open");
     assert_eq!(reader.attribute("VTKHDF", "Type").expect("type"), "PolyData");
@@ -69,17 +73,17 @@ fn a_resumed_series_equals_an_uninterrupted_one_byte_for_byte() {
         let moment = Moment { step: k, time: k as f64 / 3.0, ..MOMENT };
         series.write(&moment, 6, particles(6), Some(contacts(5))).expect("write");
     };
-    let mut series = SnapshotSeries::create(&comm, whole.path()).expect("create");
+    let mut series = SnapshotSeries::create(&comm, whole.path(), ALL).expect("create");
     (0..3).for_each(|k| write(&mut series, k));
     let after_three = contents(whole.path());
-    let mut series = SnapshotSeries::create(&comm, stopped.path()).expect("create");
+    let mut series = SnapshotSeries::create(&comm, stopped.path(), ALL).expect("create");
     (0..5).for_each(|k| write(&mut series, k));
-    let mut series = SnapshotSeries::resume(&comm, stopped.path(), 3).expect("resume");
+    let mut series = SnapshotSeries::resume(&comm, stopped.path(), 3, ALL).expect("resume");
     assert_eq!(contents(stopped.path()), after_three);
     assert_eq!(series.count(), 3);
     write(&mut series, 3);
     assert_eq!(series.count(), 4);
-    let fresh = SnapshotSeries::create(&comm, stopped.path()).expect("create");
+    let fresh = SnapshotSeries::create(&comm, stopped.path(), ALL).expect("create");
     assert_eq!(fresh.count(), 0);
     assert!(contents(stopped.path()).is_empty());
 }
@@ -88,9 +92,49 @@ fn a_resumed_series_equals_an_uninterrupted_one_byte_for_byte() {
 fn resuming_after_more_snapshots_than_there_are_is_an_error() {
     let comm = Communicator::single();
     let folder = tempfile::tempdir().expect("folder");
-    let mut series = SnapshotSeries::create(&comm, folder.path()).expect("create");
+    let mut series = SnapshotSeries::create(&comm, folder.path(), Style::default()).expect("create");
     series.write(&MOMENT, 2, particles(2), None).expect("write");
-    let message =
-        SnapshotSeries::resume(&comm, folder.path(), 2).err().map(|error| error.to_string()).unwrap_or_default();
+    let message = SnapshotSeries::resume(&comm, folder.path(), 2, Style::default())
+        .err()
+        .map(|error| error.to_string())
+        .unwrap_or_default();
     assert!(message.contains("lists 1 snapshots"), "{message}");
+}
+
+#[test]
+fn ellipsoids_have_semi_axes_and_the_tensor_of_their_glyph() {
+    let folder = tempfile::tempdir().expect("folder");
+    let comm = Communicator::single();
+    let mut series = SnapshotSeries::create(&comm, folder.path(), ALL).expect("create");
+    let mut shown = particles(3);
+    // A quarter turn about z takes the long axis to y.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    shown[0].orientation = [half, 0.0, 0.0, half];
+    let path = series.write(&MOMENT, 3, shown, None).expect("write");
+    let reader = Reader::open(&path).expect("open");
+    assert_eq!(reader.read::<f64>("VTKHDF/PointData/semi_axes", 1, 1).expect("axes"), [1.1, 0.05, 0.025]);
+    let upright = reader.read::<f64>("VTKHDF/PointData/shape_tensor", 1, 1).expect("tensor");
+    assert_eq!(upright, [1.1, 0.0, 0.0, 0.0, 0.05, 0.0, 0.0, 0.0, 0.025]);
+    let turned = reader.read::<f64>("VTKHDF/PointData/shape_tensor", 2, 1).expect("tensor");
+    let expected = [0.05, 0.0, 0.0, 0.0, 2.1, 0.0, 0.0, 0.0, 0.025];
+    assert!(turned.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{turned:?}");
+}
+
+#[test]
+fn a_dump_is_a_lammps_text_dump_with_diameters_and_quaternions() {
+    let folder = tempfile::tempdir().expect("folder");
+    let comm = Communicator::single();
+    let mut series = SnapshotSeries::create(&comm, folder.path(), ALL).expect("create");
+    series.write(&MOMENT, 2, particles(2), None).expect("write");
+    let text = fs::read_to_string(folder.path().join("snapshots/particles-000000.dump")).expect("dump");
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[..6], ["ITEM: UNITS", "si", "ITEM: TIME", "2.5e-1", "ITEM: TIMESTEP", "12"]);
+    assert_eq!(lines[6..12], ["ITEM: NUMBER OF ATOMS", "2", "ITEM: BOX BOUNDS pp pp pp", "0 1e0", "0 2e0", "0 3e0"]);
+    let names: Vec<&str> = lines[12].split(' ').skip(2).collect();
+    let row: Vec<&str> = lines[14].split(' ').collect();
+    assert_eq!(names.len(), row.len());
+    let value = |name: &str| row[names.iter().position(|known| *known == name).expect("column")];
+    let shown = ["id", "type", "x", "radius", "shapex", "shapey", "quatw", "quatk"].map(value);
+    assert_eq!(shown, ["2", "1", "1e0", "1.1e0", "2.2e0", "1e-1", "1e0", "0e0"]);
+    assert_eq!(lines.len(), 15);
 }

@@ -6,24 +6,30 @@ use crate::error::Result;
 use crate::exchange::Communicator;
 use crate::force::law::Column;
 use crate::output::hdf5_file::{Kind, Layout, Scalar, Value, Writer};
+use crate::state::shape::rotation_matrix;
 use std::collections::BTreeSet;
 use std::path::Path;
 
 const CELL_KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
-/// Particles as vertices with arrays on the points. Collective; `first` is the row of the first own
-/// particle.
+/// Particles of one rank, and where they stand among all.
+pub(super) struct Block<'a> {
+    /// Number of all particles.
+    pub total: u64,
+    /// Row of the first own one.
+    pub first: u64,
+    /// The own ones.
+    pub particles: &'a [SnapshotParticle],
+    /// Write semi-axes and tensors too.
+    pub ellipsoids: bool,
+}
+
+/// Particles as vertices with arrays on the points. Collective.
 ///
 /// # Errors
 /// As [`Writer::create`] and [`Writer::write`].
-pub(super) fn write_particles(
-    comm: &Communicator,
-    path: &Path,
-    moment: &Moment,
-    total: u64,
-    first: u64,
-    particles: &[SnapshotParticle],
-) -> Result<()> {
+pub(super) fn write_particles(comm: &Communicator, path: &Path, moment: &Moment, block: &Block) -> Result<()> {
+    let Block { total, first, particles, ellipsoids } = *block;
     let mut layout = frame(moment, total, "Vertices", total, 1);
     layout.group("VTKHDF/PointData");
     for (name, kind, columns) in [
@@ -38,6 +44,10 @@ pub(super) fn write_particles(
     ] {
         array(&mut layout, &format!("VTKHDF/PointData/{name}"), kind, total, columns);
     }
+    if ellipsoids {
+        array(&mut layout, "VTKHDF/PointData/semi_axes", Kind::F64, total, 3);
+        array(&mut layout, "VTKHDF/PointData/shape_tensor", Kind::F64, total, 9);
+    }
     let writer = Writer::create(comm, path, &layout)?;
     write_cells(&writer, "Vertices", first, particles.len() as u64, 1)?;
     let field = Rows { writer: &writer, first };
@@ -50,7 +60,22 @@ pub(super) fn write_particles(
     field.put("PointData/angular_velocity", particles, |p| p.angular_velocity)?;
     field.put("PointData/stress_trace", particles, |p| [p.stress_trace])?;
     field.put("PointData/coordination", particles, |p| [p.coordination])?;
+    if ellipsoids {
+        field.put("PointData/semi_axes", particles, |p| p.semi_axes)?;
+        field.put("PointData/shape_tensor", particles, shape_tensor)?;
+    }
     writer.finish()?.publish().map(|_| ())
+}
+
+/// `R diag(a, b, c) Rᵀ` \[m\], row by row: its eigenvectors are the axes of the body, its eigenvalues the
+/// semi-axes, which is what glyphs of tensors draw.
+fn shape_tensor(particle: &SnapshotParticle) -> [f64; 9] {
+    let (rotation, axes) = (rotation_matrix(particle.orientation), particle.semi_axes);
+    let entry = |i: usize, j: usize| {
+        let term = |k: usize| axes[k] * rotation[i][k] * rotation[j][k];
+        term(0) + term(1) + term(2)
+    };
+    std::array::from_fn(|n| entry(n / 3, n % 3))
 }
 
 /// Contacts as lines from centre to centre with arrays on the cells. Collective.

@@ -290,8 +290,16 @@ impl Atoms {
                 position[axis] = wrap(position[axis], self.cell.sides[axis]);
             }
         }
-        self.rows[index] =
-            Some(Row { species, position, radius: 0.5 * diameter, density: Some(density), velocity: None, spin: None });
+        self.rows[index] = Some(Row {
+            species,
+            position,
+            radius: 0.5 * diameter,
+            semi_axes: None,
+            orientation: None,
+            density: Some(density),
+            velocity: None,
+            spin: None,
+        });
         Ok(())
     }
 

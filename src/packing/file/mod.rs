@@ -9,6 +9,7 @@ mod lammps;
 use super::grid::Cell;
 use super::rcp::wrap;
 use crate::error::{Error, Result};
+use crate::state::shape::{bounding_radius, normalised};
 use columns::{Columns, Quantity};
 use std::path::Path;
 
@@ -19,8 +20,12 @@ pub struct Row {
     pub species: u32,
     /// Centre, wrapped into the cell \[m\].
     pub position: [f64; 3],
-    /// Radius \[m\].
+    /// Radius \[m\]; of an ellipsoid its largest semi-axis.
     pub radius: f64,
+    /// Semi-axes of an ellipsoid \[m\].
+    pub semi_axes: Option<[f64; 3]>,
+    /// Unit quaternion (w, x, y, z), if the file has it.
+    pub orientation: Option<[f64; 4]>,
     /// Density \[kg/m³\], if the file has it.
     pub density: Option<f64>,
     /// Velocity \[m/s\], if the file has it.
@@ -66,6 +71,9 @@ struct Table {
     place: Vec<String>,
 }
 
+/// The length of a quaternion in a file may differ from 1 by so much.
+const QUATERNION_TOLERANCE: f64 = 1e-3;
+
 /// So many problems are listed; the rest is counted.
 const MAX_PROBLEMS: usize = 10;
 
@@ -76,7 +84,8 @@ const MAX_PROBLEMS: usize = 10;
 /// its low corner moved to the origin. Image flags are read over.
 ///
 /// **Tables**: ids follow the order of the rows. Columns (CSV, one header line) or datasets in the root group (HDF5, by the extension `.h5` or
-/// `.hdf5`): `species` (a name), `x_m`, `y_m`, `z_m`, `radius_m`, and, each as a complete triple or
+/// `.hdf5`): `species` (a name), `x_m`, `y_m`, `z_m`, `radius_m` or, for ellipsoids, the semi-axes `a_m`,
+/// `b_m`, `c_m` with the orientation `qw`, `qx`, `qy`, `qz` (body to space, of unit length), and, each as a complete triple or
 /// not at all, `vx_m_per_s` … and `wx_rad_per_s` …. Lengths also with the unit `mm`, `um` or `nm`,
 /// velocities with `mm_per_s`, `um_per_s` or `nm_per_s`. Lines that begin with `#` are comments.
 /// Positions beyond a periodic face are wrapped.
@@ -166,12 +175,36 @@ impl Table {
         let mut triple = |quantity| Some([number(quantity, 0)?, number(quantity, 1)?, number(quantity, 2)?]);
         let position = triple(Quantity::Position)?;
         let (velocity, spin) = (triple(Quantity::Velocity), triple(Quantity::Spin));
-        let radius = number(Quantity::Radius, 0)?;
+        let semi_axes = triple(Quantity::SemiAxis);
+        let quaternion = [0, 1, 2, 3].map(|component| number(Quantity::Orientation, component));
+        let radius = semi_axes.map(bounding_radius).or_else(|| number(Quantity::Radius, 0))?;
+        let orientation = match quaternion {
+            [Some(w), Some(x), Some(y), Some(z)] => Some([w, x, y, z]),
+            _ => None,
+        };
+        let square: f64 = orientation.map_or(1.0, |q| q.iter().map(|c| c * c).sum());
+        if (square - 1.0).abs() > 2.0 * QUATERNION_TOLERANCE {
+            problems.add(format!(
+                "{}, columns qw to qz: the quaternion has the length {:.4}, an orientation has 1; correct or normalise it",
+                self.place[row],
+                square.sqrt()
+            ));
+        }
         if problems.count > before {
             return None;
         }
+        let orientation = orientation.map(normalised);
         let position = [0, 1, 2].map(|k| if cell.periodic[k] { wrap(position[k], cell.sides[k]) } else { position[k] });
-        Some(Row { species: species_index? as u32, position, radius, density: None, velocity, spin })
+        Some(Row {
+            species: species_index? as u32,
+            position,
+            radius,
+            semi_axes,
+            orientation,
+            density: None,
+            velocity,
+            spin,
+        })
     }
 }
 
@@ -180,8 +213,9 @@ fn refuse(quantity: Quantity, value: f64, si: f64, axis: usize, cell: &Cell) -> 
     if !value.is_finite() {
         return Some("is not a finite number; correct it or remove the particle".into());
     }
-    if quantity == Quantity::Radius && si <= 0.0 {
-        return Some("is not a radius; it must be greater than 0".into());
+    if matches!(quantity, Quantity::Radius | Quantity::SemiAxis) && si <= 0.0 {
+        let what = if quantity == Quantity::Radius { "radius" } else { "semi-axis" };
+        return Some(format!("is not a {what}; it must be greater than 0"));
     }
     if quantity == Quantity::Position && !cell.periodic[axis] && !(0.0..=cell.sides[axis]).contains(&si) {
         return Some(format!(

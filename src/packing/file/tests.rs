@@ -28,8 +28,16 @@ fn a_table_gives_particles_in_the_order_of_its_rows() {
     let rows =
         read_text("species, x_m, y_m, z_m, radius_m\nbinder, 0.1, 0.2, 0.3, 0.05\n# note\nactive,1e-1,0,0.5,.25\n");
     let rows = rows.unwrap();
-    let expected =
-        Row { species: 1, position: [0.1, 0.2, 0.3], radius: 0.05, density: None, velocity: None, spin: None };
+    let expected = Row {
+        species: 1,
+        position: [0.1, 0.2, 0.3],
+        radius: 0.05,
+        semi_axes: None,
+        orientation: None,
+        density: None,
+        velocity: None,
+        spin: None,
+    };
     assert_eq!(rows[0], expected);
     assert_eq!((rows[1].species, rows[1].position, rows[1].radius), (0, [0.1, 0.0, 0.5], 0.25));
 }
@@ -43,6 +51,20 @@ fn units_and_motion_are_understood_in_any_order_of_columns() {
     let row = &rows.unwrap()[0];
     assert_eq!((row.position, row.radius), ([0.5, 7e-9, 0.5e-3], 0.25e-6));
     assert_eq!((row.velocity, row.spin), (Some([1.0, 2e-3, 3e-6]), Some([1.0, 2.0, 3.0])));
+}
+
+#[test]
+fn ellipsoids_have_semi_axes_and_an_orientation_instead_of_a_radius() {
+    let header = "species,x_m,y_m,z_m,a_um,b_um,c_um,qw,qx,qy,qz\n";
+    let rows = read_text(&format!("{header}active,0,0,0.5,2,5,3,0.8,0,-0.6,0\n")).unwrap();
+    assert_eq!((rows[0].semi_axes, rows[0].radius), (Some([2e-6, 5e-6, 3e-6]), 5e-6));
+    assert_eq!(rows[0].orientation, Some([0.8, 0.0, -0.6, 0.0]));
+    let bad = |text: &str| format!("{header}active,0,0,0.5,{text}\n");
+    assert_refused(&bad("2,0,3,1,0,0,0"), &["line 2", "column b_um", "is not a semi-axis"]);
+    assert_refused(&bad("2,5,3,1,1,0,0"), &["line 2", "qw to qz", "length 1.4142", "normalise"]);
+    assert_refused("species,x_m,y_m,z_m,a_m,b_m,c_m\nactive,0,0,0,1,1,1\n", &["column qw is missing"]);
+    let both = "species,x_m,y_m,z_m,radius_m,a_m,b_m,c_m,qw,qx,qy,qz\n";
+    assert_refused(both, &["radius and semi-axes are both given"]);
 }
 
 #[test]
