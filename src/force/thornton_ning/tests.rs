@@ -211,12 +211,13 @@ fn a_pair_without_surface_energy_is_refused_and_a_nan_is_not_hidden() {
 
 #[test]
 fn necks_that_outreach_the_memory_range_are_warned_of() {
-    let pair =
-        |range| pair(constants(ENERGY, NEVER), choice(Role::Normal, "thornton_ning", &[("memory_range", range)]));
-    // R_eff = 2.5 µm: a_s/R_eff = 0.0971, times 0.4725 of its square.
-    assert!(caution(&pair("0.001"), 2.0 * RADIUS).unwrap().contains("memory_range 0.001"));
+    let warning = |range: &str| {
+        let law = choice(Role::Normal, "thornton_ning", &[("memory_range", range)]);
+        caution(&pair(constants(ENERGY, NEVER), law), 2.0 * RADIUS)
+    };
+    assert!(warning("0.001").unwrap().contains("memory_range 0.001"));
     let scale = libm::cbrt(2.0 * PI * ENERGY / (modulus() * RADIUS));
     let needed = 0.472_470_4 * scale * scale;
-    assert!(caution(&pair(&format!("{}", 1.0001 * needed)), 2.0 * RADIUS).is_none());
-    assert!(caution(&pair(&format!("{}", 0.9999 * needed)), 2.0 * RADIUS).is_some());
+    assert!(warning(&format!("{}", 1.0001 * needed)).is_none());
+    assert!(warning(&format!("{}", 0.9999 * needed)).is_some());
 }
