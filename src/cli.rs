@@ -8,6 +8,7 @@ use crate::output::{checkpoint, plot};
 use crate::run::{self, Outcome, RunOptions};
 use crate::scaling::{self, ScalingOptions};
 use crate::verify;
+use crate::verify::becker2021::Becker2021Options;
 use crate::verify::wahn2022::Wahn2022Options;
 use clap::{Args, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -97,6 +98,8 @@ enum Command {
 enum Paper {
     /// Recompute and draw the figures of Wahn, Gan, Kamlah 2022 and compare with what they must show.
     Wahn2022(Wahn2022Options),
+    /// Recompute and draw figures of Becker, Kamlah 2021 and compare with what they must show.
+    Becker2021(Becker2021Options),
 }
 
 impl InputArguments {
@@ -141,6 +144,9 @@ pub fn main() -> i32 {
         Command::Scaling(options) => scaling::main(&options),
         Command::Verify { paper: Some(Paper::Wahn2022(options)), .. } => {
             return verify::wahn2022::main(&options).unwrap_or_else(|error| report(&error));
+        }
+        Command::Verify { paper: Some(Paper::Becker2021(options)), .. } => {
+            return verify::becker2021::main(&options).unwrap_or_else(|error| report(&error));
         }
         Command::Verify { filter, paper: None } => return verify::main(filter.as_deref()),
         Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),

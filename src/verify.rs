@@ -1,6 +1,7 @@
 //! `dem-mpi verify`: runs cases with a known answer through the whole program in this process and
 //! compares. Knows the simulation from outside only, as a user's script would.
 
+pub mod becker2021;
 mod collision;
 mod conservation;
 mod ellipsoids;

@@ -249,6 +249,9 @@ fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
             quantity(mean, "m")
         };
         table.row(format!("radius of {}", species.name), text);
+        if !species.is_spherical() {
+            table.row(format!("semi-axes of {}", species.name), format!("up to {}", quantity(species.largest_semi_axis(), "m")));
+        }
     }
     let base_sides = config.cell.sides.or_else(|| {
         let volume = estimate.solid_volume / config.replication.number() as f64 / estimate.solid_fraction?;

@@ -54,6 +54,7 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
         assert!(memory <= MAX_MEMORY, "a composition of contact laws has more memory columns than the pass holds");
         memory
     };
+    const NORMAL_MEMORY: usize = N::MEMORY;
     const TANGENTIAL: bool = T::MEMORY > 0;
     const ROLLING: bool = R::MEMORY > 0;
     const LASTS: bool = N::LASTS;
@@ -78,12 +79,15 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     }
 
     #[inline(always)]
-    fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L> {
-        let (normal_memory, rest) = memory.split_at_mut(N::MEMORY);
-        let (tangential_memory, rolling_memory) = rest.split_at_mut(T::MEMORY);
-        let normal = self.normal.evaluate(touch, normal_memory);
-        let mut tangential = self.tangential.evaluate(touch, &normal, tangential_memory);
-        let mut rolling = self.rolling.evaluate(touch, &normal, rolling_memory);
+    fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
+        self.normal.evaluate(touch, memory)
+    }
+
+    #[inline(always)]
+    fn complete<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> ContactResponse<L> {
+        let (tangential_memory, rolling_memory) = memory.split_at_mut(T::MEMORY);
+        let mut tangential = self.tangential.evaluate(touch, normal, tangential_memory);
+        let mut rolling = self.rolling.evaluate(touch, normal, rolling_memory);
         // Written so that NaN counts as joined and is found.
         let joined = !L::splat(0.0).at_least(normal.contact_radius);
         if N::LASTS {

@@ -2,7 +2,7 @@
 
 use super::lane::{Lane, RECORD, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
-use crate::contact::shift::ShiftTable;
+use crate::contact::shift::{self, ShiftTable};
 use crate::state::particles::Record;
 
 /// A contact exists where δ exceeds this fraction of R_i + R_j: image pairs that just touch (W Fig. 8)
@@ -18,6 +18,8 @@ pub struct CellMotion {
     pub shift: ShiftTable,
     /// S·L̇ for each image shift (BC; zero in BCT) \[m/s\].
     pub shift_velocity: ShiftTable,
+    /// The faces move past the particles (BC): only then `shift_velocity` is looked up.
+    pub faces_move: bool,
     /// L̇/L per axis (BCT; zero in BC) \[1/s\]: the affine part of the relative velocity per branch vector.
     pub gradient: [f64; 3],
     /// Absolute velocity of the high walls (BC; zero in BCT, where `gradient` holds it) \[m/s\].
@@ -74,54 +76,125 @@ pub struct PairTouch<L: Lane> {
     pub min_radius: L,
 }
 
+/// `S·factor` of some packed shifts.
 #[inline(always)]
-pub(super) fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
+#[must_use]
+pub fn image<L: Lane>(table: &ShiftTable, codes: &[u16]) -> Vector<L> {
     [L::look_up(&table.axes[0], codes, 0), L::look_up(&table.axes[1], codes, 3), L::look_up(&table.axes[2], codes, 6)]
 }
 
-/// Touch of two spheres a and b, b in the image of its packed shift. The contact point lies on the line of
-/// centres at `R_i − δ R_j/(R_i+R_j)` from i. NaN counts as touching, so that it is found.
+/// Two spheres relative to each other, before any root or division.
+#[derive(Debug, Clone, Copy)]
+pub struct Relative<L> {
+    /// Branch vector d from first to second \[m\].
+    pub branch: Vector<L>,
+    /// Velocity of the second relative to the first, with what the cell imposes \[m/s\].
+    pub velocity: Vector<L>,
+    /// The part of it that the cell's motion imposes \[m/s\].
+    pub imposed_velocity: Vector<L>,
+    /// Velocity of the two surfaces by their spins, `R_i ω_i + R_j ω_j` \[m/s\].
+    pub rim_velocity: Vector<L>,
+    /// ω_i + ω_j \[rad/s\].
+    pub spin_sum: Vector<L>,
+    /// ω_j − ω_i \[rad/s\].
+    pub relative_spin: Vector<L>,
+    /// R_i and R_j \[m\].
+    pub radii: [L; 2],
+    /// 1/m_i + 1/m_j \[1/kg\].
+    pub inverse_masses: L,
+}
+
+impl<L: Lane> PairTouch<L> {
+    /// Lanes whose law is asked: those that touch, and those near enough for a memory that lasts; `range` is the
+    /// law's, 0 for a memory that ends with the touch.
+    #[inline(always)]
+    #[must_use]
+    pub fn alive(&self, range: f64) -> L::Mask {
+        if range == 0.0 {
+            return self.touching;
+        }
+        // The effective radius of flat ellipsoids has no bound; that of spheres is below the smaller radius.
+        let reach = L::splat(-range) * self.touch.effective_radius.min(self.min_radius);
+        self.touching | self.touch.overlap.greater(reach)
+    }
+}
+
+/// Spheres a and b, b in the image of its packed shift.
 ///
 /// # Source
 /// PHYSICS.md section 1.
 #[inline(always)]
 #[must_use]
-pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
-    let branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
-    let distance_squared = dot(branch, branch);
-    let sum = a.radius + b.radius;
-    let distance = distance_squared.sqrt();
-    let overlap = sum - distance;
-    // The first catches what the square root rounds away.
-    let apart = distance_squared.at_least(sum * sum) | (L::splat(TOUCH_TOLERANCE) * sum).at_least(overlap);
-    let normal = scale(branch, L::splat(1.0) / distance);
+pub fn relative<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> Relative<L> {
+    let mut branch = sub(b.position, a.position);
+    let mut imposed_velocity = [L::splat(0.0); 3];
+    // Away from periodic faces there is nothing to look up. (x + 0) − y and x − y are the same: no position is −0.
+    if !shift::all_here(codes) {
+        branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
+        if motion.faces_move {
+            imposed_velocity = image(&motion.shift_velocity, codes);
+        }
+    }
     let [gx, gy, gz] = motion.gradient;
     let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
-    let imposed_velocity = add(image(&motion.shift_velocity, codes), affine);
-    let velocity = add(sub(b.velocity, a.velocity), imposed_velocity);
+    imposed_velocity = add(imposed_velocity, affine);
+    Relative {
+        branch,
+        velocity: add(sub(b.velocity, a.velocity), imposed_velocity),
+        imposed_velocity,
+        rim_velocity: add(scale(a.spin, a.radius), scale(b.spin, b.radius)),
+        spin_sum: add(a.spin, b.spin),
+        relative_spin: sub(b.spin, a.spin),
+        radii: [a.radius, b.radius],
+        inverse_masses: a.inverse_mass + b.inverse_mass,
+    }
+}
+
+/// The touch of two spheres. The contact point lies on the line of centres in the middle of the overlap, at
+/// `R_i − δ/2` from i. NaN counts as touching, so that it is found.
+#[inline(always)]
+#[must_use]
+pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
+    let (branch, [first, second]) = (pair.branch, pair.radii);
+    let distance = dot(branch, branch).sqrt();
+    let sum = first + second;
+    let overlap = sum - distance;
+    let normal = scale(branch, L::splat(1.0) / distance);
     // One division for two: 1/(R_i + R_j) and m_eff = 1/(1/m_i + 1/m_j).
-    let inverse_masses = a.inverse_mass + b.inverse_mass;
-    let both = L::splat(1.0) / (sum * inverse_masses);
-    let per_sum = both * inverse_masses;
-    let share = overlap * per_sum;
-    let (arm_first, arm_second) = (a.radius - share * b.radius, b.radius - share * a.radius);
-    let approach = dot(velocity, normal);
-    let turning = cross(add(scale(a.spin, arm_first), scale(b.spin, arm_second)), normal);
+    let both = L::splat(1.0) / (sum * pair.inverse_masses);
+    let half_overlap = L::splat(0.5) * overlap;
+    let approach = dot(pair.velocity, normal);
+    // Σ (R − δ/2) ω, the surfaces at the contact point.
+    let turning = cross(sub(pair.rim_velocity, scale(pair.spin_sum, half_overlap)), normal);
     let touch = Touch {
         overlap,
         overlap_rate: -approach,
-        effective_radius: a.radius * b.radius * per_sum,
+        effective_radius: first * second * (both * pair.inverse_masses),
         radius_factor: L::splat(1.0),
         overlap_factor: L::splat(1.0),
         size: sum,
         effective_mass: both * sum,
         normal,
-        slip_velocity: sub(sub(velocity, scale(normal, approach)), turning),
-        relative_spin: sub(b.spin, a.spin),
-        mean_spin: scale(add(a.spin, b.spin), L::splat(0.5)),
+        slip_velocity: sub(sub(pair.velocity, scale(normal, approach)), turning),
+        relative_spin: pair.relative_spin,
+        spin_about_normal: L::splat(0.5) * dot(pair.spin_sum, normal),
     };
-    let min_radius = a.radius.min(b.radius);
-    PairTouch { touching: !apart, touch, branch, imposed_velocity, arm_first, arm_second, min_radius }
+    PairTouch {
+        touching: !(L::splat(TOUCH_TOLERANCE) * sum).at_least(overlap),
+        touch,
+        branch,
+        imposed_velocity: pair.imposed_velocity,
+        arm_first: first - half_overlap,
+        arm_second: second - half_overlap,
+        min_radius: first.min(second),
+    }
+}
+
+/// Touch of two spheres a and b, b in the image of its packed shift.
+#[inline(always)]
+#[must_use]
+pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
+    touch(&relative(a, b, codes, motion))
 }
 
 /// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves
@@ -152,7 +225,7 @@ pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> PairTouch<f64> {
         normal: unit,
         slip_velocity: sub(sub(velocity, scale(unit, approach)), turning),
         relative_spin: scale(a.spin, -1.0),
-        mean_spin: scale(a.spin, 0.5),
+        spin_about_normal: 0.5 * dot(a.spin, unit),
     };
     PairTouch {
         touching: !(TOUCH_TOLERANCE * a.radius).at_least(overlap),

@@ -73,9 +73,15 @@ pub trait Lane:
         }
         Self::load(&values)
     }
-    /// Ask for the records of the first `WIDTH` particles to be brought near. Changes nothing.
-    #[inline(always)]
-    fn prefetch(_records: &[Record], _index: &[u32]) {}
+}
+
+/// Ask for the cache lines of `count` values from place `index` on to be brought near, there or not. Changes nothing.
+#[inline(always)]
+pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for offset in (0..count * size_of::<T>()).step_by(64) {
+        avx2::prefetch_at(values.as_ptr().wrapping_add(index).cast::<i8>().wrapping_add(offset));
+    }
 }
 
 impl Lane for f64 {

@@ -33,8 +33,8 @@ pub struct Touch<L> {
     pub slip_velocity: Vector<L>,
     /// Angular velocity of j relative to i, ω_j − ω_i \[rad/s\].
     pub relative_spin: Vector<L>,
-    /// Mean angular velocity (ω_i + ω_j)/2 \[rad/s\].
-    pub mean_spin: Vector<L>,
+    /// Mean angular velocity about the normal, n·(ω_i + ω_j)/2 \[rad/s\].
+    pub spin_about_normal: L,
 }
 
 /// Energies of one touch that the observing pass sums (the plain pass leaves them to the
@@ -202,6 +202,8 @@ pub struct ContactResponse<L: Lane> {
 pub trait ContactLaw: Copy + Send + Sync + 'static {
     /// Number of memory columns.
     const MEMORY: usize;
+    /// How many of them, from the first on, are the normal law's.
+    const NORMAL_MEMORY: usize;
     /// Has a tangential force (torques from the arm, spins needed).
     const TANGENTIAL: bool;
     /// Has rolling or twisting moments.
@@ -216,8 +218,17 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     fn prepare(&mut self, time_step: f64);
     /// The relaxed limit, see [`NormalLaw::relax`].
     fn relax(&mut self) {}
-    /// Forces of one touch; `memory` has `MEMORY` entries.
-    fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L>;
+    /// The normal law's part; `memory` has `NORMAL_MEMORY` entries.
+    fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
+    /// The other laws' part and the whole response; `memory` has the remaining entries.
+    fn complete<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> ContactResponse<L>;
+    /// Both parts of one touch; `memory` has `MEMORY` entries.
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L> {
+        let (own, rest) = memory.split_at_mut(Self::NORMAL_MEMORY);
+        let normal = self.normal(touch, own);
+        self.complete(touch, &normal, rest)
+    }
 }
 
 /// Runs the monomorphised loop for a law chosen at run time: the registry calls `visit` once with the

@@ -62,6 +62,8 @@ pub struct Mindlin<const SPRINGS: usize> {
     rate: [f64; SPRINGS],
     decay: [f64; SPRINGS],
     weight: [f64; SPRINGS],
+    /// ½ Δt f · 8 G_k (1−e^{−x})/x \[Pa s\]: half a step's increment per contact radius and slip velocity.
+    increment: [f64; SPRINGS],
     friction: f64,
     /// c_t/c_n, 0 without dashpot.
     dashpot_ratio: f64,
@@ -80,20 +82,11 @@ impl<const SPRINGS: usize> Mindlin<SPRINGS> {
             rate: shear.rate,
             decay: [1.0; SPRINGS],
             weight: [1.0; SPRINGS],
+            increment: [0.0; SPRINGS],
             friction,
             dashpot_ratio: if damping { (4.0 * factor * shear.shear_to_young).sqrt() } else { 0.0 },
             time_step: 0.0,
         }
-    }
-
-    /// The cut sum of spring force and dashpot.
-    #[inline(always)]
-    fn with_dashpot<L: Lane>(&self, spring: Vector<L>, touch: &Touch<L>, coefficient: L, limit: L) -> Vector<L> {
-        if self.dashpot_ratio == 0.0 {
-            return spring;
-        }
-        let sum = add(spring, scale(touch.slip_velocity, L::splat(self.dashpot_ratio) * coefficient));
-        scale(sum, carried_share_of_vector(sum, limit))
     }
 }
 
@@ -136,62 +129,68 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
             let x = time_step * self.rate[k];
             self.decay[k] = libm::exp(-x);
             self.weight[k] = mean_decay(x);
+            self.increment[k] = 0.5 * time_step * self.modulus[k] * self.weight[k];
         }
     }
 
     fn relax(&mut self) {
         for k in (0..SPRINGS).filter(|&k| self.rate[k] > 0.0) {
-            (self.decay[k], self.weight[k]) = (0.0, 0.0);
+            (self.decay[k], self.weight[k], self.increment[k]) = (0.0, 0.0, 0.0);
         }
     }
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
-        let zero = L::splat(0.0);
-        let half = L::splat(0.5);
+        let (zero, half, one) = (L::splat(0.0), L::splat(0.5), L::splat(1.0));
         let turning = Turning::new(touch, self.time_step);
         let radius = normal.contact_radius;
         let last = memory[3 * SPRINGS];
-        let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
         let limit = coulomb_limit(self.friction, normal.force);
-        let mut energies = Energies::zero();
 
+        let mut advance = [[zero; 3]; SPRINGS];
         let mut trial = [[zero; 3]; SPRINGS];
-        let mut load = [zero; 3];
+        let mut carried = [[zero; 3]; SPRINGS];
         for k in 0..SPRINGS {
+            let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
+            carried[k] = turning.apply(stored, radius, last);
+            advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * radius);
+            trial[k] = add(carried[k], advance[k]);
+        }
+        let load = trial[1..].iter().fold(trial[0], |sum, spring| add(sum, *spring));
+        let damping = scale(touch.slip_velocity, L::splat(self.dashpot_ratio) * normal.dashpot);
+
+        let sum = add(load, damping);
+        let share = carried_share_of_vector(sum, limit);
+        let value = scale(sum, share);
+
+        let mut energies = Energies::zero();
+        let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
+        let slipped = share * (one - share);
+        for k in 0..SPRINGS {
+            let force = scale(trial[k], share);
+            // The last spring is the long-term one, whose decay is 1.
+            let relaxed = if k + 1 == SPRINGS { force } else { scale(force, L::splat(self.decay[k])) };
+            let ahead = add(relaxed, advance[k]);
+
             let stiffness = L::splat(self.modulus[k]) * radius;
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            let carried = turning.apply(stored, radius, last);
-            trial[k] = add(carried, scale(half_slip, stiffness * L::splat(self.weight[k])));
-            load = add(load, trial[k]);
             let last_stiffness = L::splat(self.modulus[k]) * last;
-            let shrunk = stiffness_loss(dot(stored, stored), last_stiffness, dot(carried, carried), stiffness);
-            energies.friction = energies.friction + shrunk;
-            energies.viscous = energies.viscous + relaxation_loss(carried, half_slip, trial[k], stiffness);
-        }
-
-        let share = carried_share_of_vector(load, limit);
-        let slipped = share * (L::splat(1.0) - share);
-        for k in 0..SPRINGS {
-            let stiffness = L::splat(self.modulus[k]) * radius;
-            let force = scale(trial[k], share);
-            let advance = scale(half_slip, stiffness * L::splat(self.weight[k]));
-            let ahead = add(scale(force, L::splat(self.decay[k])), advance);
-            [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]] = ahead;
+            let shrunk = stiffness_loss(dot(stored, stored), last_stiffness, dot(carried[k], carried[k]), stiffness);
+            energies.friction = energies.friction + shrunk + slipped * dot(trial[k], trial[k]) / stiffness;
+            energies.viscous = energies.viscous
+                + relaxation_loss(carried[k], half_slip, trial[k], stiffness)
+                + relaxation_loss(force, half_slip, ahead, stiffness);
             let held = half * dot(force, force) / stiffness;
             if self.rate[k] == 0.0 {
                 energies.elastic = energies.elastic + held;
             } else {
                 energies.viscoelastic = energies.viscoelastic + held;
             }
-            energies.friction = energies.friction + slipped * dot(trial[k], trial[k]) / stiffness;
-            energies.viscous = energies.viscous + relaxation_loss(force, half_slip, ahead, stiffness);
+            [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]] = ahead;
         }
         memory[3 * SPRINGS] = radius;
-
-        let spring = scale(load, share);
-        let value = self.with_dashpot(spring, touch, normal.dashpot, limit);
-        energies.damping = dot(sub(value, spring), touch.slip_velocity) * L::splat(self.time_step);
+        let dissipated = sub(value, scale(load, share));
+        energies.damping = dot(dissipated, touch.slip_velocity) * L::splat(self.time_step);
         VectorResponse { value, energies }
     }
 }

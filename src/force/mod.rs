@@ -24,3 +24,4 @@ pub mod slider;
 mod testing;
 pub mod thornton;
 pub mod thornton_ning;
+pub mod touches;

@@ -3,12 +3,13 @@
 
 use super::composition::{self, MAX_MEMORY};
 use super::geometry::{self, Bodies, CellMotion, PairTouch};
-use super::lane::{Lane, cross, dot, scale, sub};
+use super::lane::{Lane, cross, dot, prefetch, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use super::lane::{avx2::F64x4, avx512::F64x8};
-use super::law::{Column, ContactLaw, LawVisitor, Touch};
+use super::law::{Column, ContactLaw, ContactResponse, LawVisitor, Touch};
 use super::observe::Observed;
 use super::simd::Simd;
+use super::touches::{BATCH, BlockTouches, Content, LawTouch};
 use crate::config::PairConfig;
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
@@ -20,8 +21,11 @@ mod ellipsoids;
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
 
-/// How many blocks ahead records are asked for.
-const PREFETCH: usize = 6;
+/// How many blocks ahead memory and records are asked for.
+const PREFETCH: usize = 8;
+
+/// Bytes of records that need no asking ahead.
+const NEAREST_CACHES: usize = 1 << 20;
 
 /// What all passes of a step share.
 #[derive(Debug, Clone, Copy)]
@@ -45,9 +49,10 @@ pub struct PassInput<'a> {
 #[derive(Debug)]
 pub struct LineRing<'a> {
     /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
-    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
+    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's
+    /// `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
-    /// Number of the first block's first line.
+    /// Number of the first block's first line, a multiple of eight.
     pub first: usize,
     /// Capacity less one, all ones in binary; `usize::MAX` for a buffer that never wraps.
     pub mask: usize,
@@ -83,6 +88,8 @@ pub struct Job<'a> {
     pub blocks: Range<usize>,
     /// Where the forces go.
     pub lines: LineRing<'a>,
+    /// Room for touches between geometry and law.
+    pub touches: &'a mut [BlockTouches; BATCH],
 }
 
 /// A contact that overlaps too much or is not a number: its place in the section and overlap ratio.
@@ -175,7 +182,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             normal: [0.0, 0.0, 1.0],
             slip_velocity: [0.0; 3],
             relative_spin: [0.0; 3],
-            mean_spin: [0.0; 3],
+            spin_about_normal: 0.0,
         };
         let mut memory = [0.0; MAX_MEMORY];
         self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
@@ -192,22 +199,37 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         if job.section.partners == Partners::Wall {
             return self.walls(job);
         }
-        match (job.input.simd, job.input.ledger) {
-            // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
-            #[cfg(target_arch = "x86_64")]
-            (Simd::Avx512, false) => unsafe { self.spheres_avx512::<false>(job) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            (Simd::Avx512, true) => unsafe { self.spheres_avx512::<true>(job) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            (Simd::Avx2, false) => unsafe { self.spheres_avx2::<false>(job) },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            (Simd::Avx2, true) => unsafe { self.spheres_avx2::<true>(job) },
-            (_, false) => self.spheres::<f64, false>(job),
-            (_, true) => self.spheres::<f64, true>(job),
+        let Job { input, bodies, section, blocks, mut lines, touches } = job;
+        let records = bodies.records;
+        let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
+        let mut excess = None;
+        for start in blocks.clone().step_by(BATCH) {
+            let blocks = start..(start + BATCH).min(blocks.end);
+            prefetch(&section.memory, (start + PREFETCH) * C::MEMORY, BATCH * C::MEMORY);
+            let found = geometry_pass(input, records, section, blocks.clone(), content, touches);
+            excess = excess.or(found);
+            let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
+            let memory = &mut section.memory[blocks.start * C::MEMORY..blocks.end * C::MEMORY];
+            let touches = &mut touches[..blocks.len()];
+            match (input.simd, input.ledger) {
+                // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx512, false) => unsafe { laws.avx512::<false>(touches, memory, &mut lines) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx512, true) => unsafe { laws.avx512::<true>(touches, memory, &mut lines) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx2, false) => unsafe { laws.avx2::<false>(touches, memory, &mut lines) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx2, true) => unsafe { laws.avx2::<true>(touches, memory, &mut lines) },
+                (_, false) => laws.blocks::<f64, false>(touches, memory, &mut lines),
+                (_, true) => laws.blocks::<f64, true>(touches, memory, &mut lines),
+            }
+            lines.first += blocks.len() * BLOCK;
         }
+        excess
     }
 
     fn observe(
@@ -245,56 +267,16 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 }
 
 impl<C: ContactLaw> LawPass<C> {
-    /// Lanes whose law is asked: those that touch, and those near enough for a memory that lasts.
+    /// Lanes whose law is asked.
     #[inline(always)]
     fn alive<L: Lane>(&self, pair: &PairTouch<L>) -> L::Mask {
-        if !C::LASTS {
-            return pair.touching;
-        }
-        // The effective radius of flat ellipsoids has no bound; that of spheres is below the smaller radius.
-        let reach = L::splat(-self.law.range()) * pair.touch.effective_radius.min(pair.min_radius);
-        pair.touching | pair.touch.overlap.greater(reach)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn spheres_avx2<const LEDGER: bool>(&self, job: Job) -> Excess {
-        self.spheres::<F64x4, LEDGER>(job)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512vl")]
-    fn spheres_avx512<const LEDGER: bool>(&self, job: Job) -> Excess {
-        self.spheres::<F64x8, LEDGER>(job)
-    }
-
-    #[inline(always)]
-    fn spheres<L: Lane, const LEDGER: bool>(&self, job: Job) -> Excess {
-        let Job { input, bodies, section, blocks, lines } = job;
-        let records = bodies.records;
-        let mut excess = None;
-        let limit = L::splat(input.max_overlap_fraction);
-        let (start, end) = (blocks.start * BLOCK, blocks.end * BLOCK);
-        for place in (start..end).step_by(L::WIDTH) {
-            let pair = touch::<L>(input, records, section, place);
-            let (block, lane) = (place / BLOCK, place % BLOCK);
-            let slot = ((lines.first + place - start) & lines.mask) * input.stride;
-            let rows = &mut lines.values[slot..slot + L::WIDTH * input.stride];
-            let memory = &mut section.memory[block * C::MEMORY..(block + 1) * C::MEMORY];
-            self.contacts::<L, LEDGER>(input, &pair, memory, lane, rows, false);
-            // Written so that NaN counts as a fault.
-            let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
-            if excess.is_none() && L::any(pair.touching & !within) {
-                excess =
-                    first_excess(pair.touching, pair.touch.overlap, pair.min_radius, input.max_overlap_fraction, place);
-            }
-        }
-        excess
+        pair.alive(if C::LASTS { self.law.range() } else { 0.0 })
     }
 
     fn walls(&self, job: Job) -> Excess {
-        let Job { input, bodies, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines, .. } = job;
         let records = bodies.records;
+        let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
@@ -302,67 +284,16 @@ impl<C: ContactLaw> LawPass<C> {
             let start = place / BLOCK * C::MEMORY;
             let memory = &mut section.memory[start..start + C::MEMORY];
             let pair = geometry::wall(&records[section.first[place] as usize], section.second[place], input.motion);
+            let lane = place % BLOCK;
             if input.ledger {
-                self.contacts::<f64, true>(input, &pair, memory, place % BLOCK, rows, true);
+                laws.wall::<true>(&pair, memory, lane, rows);
             } else {
-                self.contacts::<f64, false>(input, &pair, memory, place % BLOCK, rows, true);
+                laws.wall::<false>(&pair, memory, lane, rows);
             }
             let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
             excess = excess.or_else(|| first_excess(pair.touching, overlap, radius, input.max_overlap_fraction, place));
         }
         excess
-    }
-
-    /// Law and output of `L::WIDTH` contacts that begin at `lane` of their block.
-    #[inline(always)]
-    fn contacts<L: Lane, const LEDGER: bool>(
-        &self,
-        input: &PassInput,
-        pair: &PairTouch<L>,
-        memory: &mut [CacheLine],
-        lane: usize,
-        rows: &mut [f64],
-        wall: bool,
-    ) {
-        let zero = L::splat(0.0);
-        let alive = self.alive(pair);
-        if !L::any(alive) {
-            rows.fill(0.0);
-            for column in memory {
-                zero.store(&mut column.0[lane..]);
-            }
-            return;
-        }
-        let mut values = [zero; MAX_MEMORY];
-        let memory = &mut memory[..C::MEMORY];
-        for column in 0..C::MEMORY {
-            values[column] = L::load(&memory[column].0[lane..]);
-        }
-        let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-        let kept = |value: L| L::select(alive, value, zero);
-        for column in 0..C::MEMORY {
-            kept(values[column]).store(&mut memory[column].0[lane..]);
-        }
-        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
-        let stride = input.stride;
-        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
-        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
-        if own >= 8 {
-            let turning = cross(pair.touch.normal, response.tangential_force);
-            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
-        }
-        if own >= 12 {
-            let moment = response.moment;
-            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
-        }
-        if LEDGER {
-            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
-            let work = kept(dot(force, pair.imposed_velocity) * L::splat(input.time_step));
-            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
-            let e = &response.energies;
-            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
-            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
-        }
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -441,16 +372,210 @@ impl<C: ContactLaw> LawPass<C> {
     }
 }
 
-/// Geometry of the `L::WIDTH` contacts from `place` on; records of later ones are asked for.
-#[inline(always)]
-fn touch<L: Lane>(input: &PassInput, records: &[Record], section: &Section, place: usize) -> PairTouch<L> {
-    let ahead = place + PREFETCH * BLOCK;
-    if ahead + L::WIDTH <= section.second.len() {
-        L::prefetch(records, &section.second[ahead..ahead + L::WIDTH]);
+/// A law in the loop over the touches of some blocks.
+struct Laws<'a, C> {
+    law: &'a C,
+    stride: usize,
+    time_step: f64,
+}
+
+impl<C: ContactLaw> Laws<'_, C> {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn avx2<const LEDGER: bool>(&self, touches: &mut [BlockTouches], memory: &mut [CacheLine], lines: &mut LineRing) {
+        self.blocks::<F64x4, LEDGER>(touches, memory, lines);
     }
-    let a = Bodies::<L>::gather(records, &section.first[place..place + L::WIDTH]);
-    let b = Bodies::<L>::gather(records, &section.second[place..place + L::WIDTH]);
-    geometry::spheres(&a, &b, &section.shift[place..place + L::WIDTH], input.motion)
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl")]
+    fn avx512<const LEDGER: bool>(&self, touches: &mut [BlockTouches], memory: &mut [CacheLine], lines: &mut LineRing) {
+        self.blocks::<F64x8, LEDGER>(touches, memory, lines);
+    }
+
+    /// Law and output of some blocks.
+    #[inline(always)]
+    fn blocks<L: Lane, const LEDGER: bool>(
+        &self,
+        touches: &mut [BlockTouches],
+        memory: &mut [CacheLine],
+        lines: &mut LineRing,
+    ) {
+        let lanes = || (0..BLOCK).step_by(L::WIDTH);
+        let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
+        for (block, touches) in touches.iter_mut().enumerate() {
+            for lane in lanes() {
+                let pair = touches.touch::<L>(lane);
+                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
+                    self.law.normal(&pair.touch, memory)
+                });
+                touches.put_normal(lane, &normal, LEDGER);
+            }
+        }
+        for (block, touches) in touches.iter().enumerate() {
+            for lane in lanes() {
+                let slot = ((lines.first + block * BLOCK + lane) & lines.mask) * self.stride;
+                let rows = &mut lines.values[slot..slot + L::WIDTH * self.stride];
+                let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
+                let rest = C::NORMAL_MEMORY..C::MEMORY;
+                let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
+                    self.law.complete(&pair.touch, &normal, memory)
+                });
+                self.write::<L, LEDGER>(&pair, &response, rows, false);
+            }
+        }
+    }
+
+    /// Law and output of a wall contact.
+    fn wall<const LEDGER: bool>(&self, pair: &PairTouch<f64>, memory: &mut [CacheLine], lane: usize, rows: &mut [f64]) {
+        let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
+        let response =
+            with_memory(memory, 0..C::MEMORY, lane, pair.alive, |memory| self.law.evaluate(&pair.touch, memory));
+        self.write::<f64, LEDGER>(&pair, &response, rows, true);
+    }
+
+    /// Output of `L::WIDTH` contacts.
+    #[inline(always)]
+    fn write<L: Lane, const LEDGER: bool>(
+        &self,
+        pair: &LawTouch<L>,
+        response: &ContactResponse<L>,
+        rows: &mut [f64],
+        wall: bool,
+    ) {
+        let zero = L::splat(0.0);
+        let kept = |value: L| L::select(pair.alive, value, zero);
+        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
+        let stride = self.stride;
+        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
+        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
+        if own >= 8 {
+            let turning = cross(pair.touch.normal, response.tangential_force);
+            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
+        }
+        if own >= 12 {
+            let moment = response.moment;
+            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
+        }
+        if LEDGER {
+            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
+            let work = kept(dot(force, pair.imposed_velocity) * L::splat(self.time_step));
+            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
+            let e = &response.energies;
+            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
+            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
+        }
+    }
+}
+
+/// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number.
+fn geometry_pass(
+    input: &PassInput,
+    records: &[Record],
+    section: &Section,
+    blocks: Range<usize>,
+    content: Content,
+    touches: &mut [BlockTouches; BATCH],
+) -> Excess {
+    match input.simd {
+        // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx512 => unsafe { geometry_avx512(input, records, section, blocks, content, touches) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2 => unsafe { geometry_avx2(input, records, section, blocks, content, touches) },
+        _ => geometry_of::<f64>(input, records, section, blocks, content, touches),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn geometry_avx2(
+    input: &PassInput,
+    records: &[Record],
+    section: &Section,
+    blocks: Range<usize>,
+    content: Content,
+    touches: &mut [BlockTouches; BATCH],
+) -> Excess {
+    geometry_of::<F64x4>(input, records, section, blocks, content, touches)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl")]
+fn geometry_avx512(
+    input: &PassInput,
+    records: &[Record],
+    section: &Section,
+    blocks: Range<usize>,
+    content: Content,
+    touches: &mut [BlockTouches; BATCH],
+) -> Excess {
+    geometry_of::<F64x8>(input, records, section, blocks, content, touches)
+}
+
+#[inline(always)]
+fn geometry_of<L: Lane>(
+    input: &PassInput,
+    records: &[Record],
+    section: &Section,
+    blocks: Range<usize>,
+    content: Content,
+    touches: &mut [BlockTouches; BATCH],
+) -> Excess {
+    let mut excess = None;
+    let limit = L::splat(input.max_overlap_fraction);
+    let lanes = || (0..BLOCK).step_by(L::WIDTH);
+    let far = size_of_val(records) > NEAREST_CACHES;
+    for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
+        for lane in lanes() {
+            let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
+            if far && places.end + PREFETCH * BLOCK <= section.second.len() {
+                for place in places.start + PREFETCH * BLOCK..places.end + PREFETCH * BLOCK {
+                    let (first, second) = (section.first[place], section.second[place]);
+                    prefetch(records, if first < second { second } else { first } as usize, 1);
+                }
+            }
+            let a = Bodies::<L>::gather(records, &section.first[places.clone()]);
+            let b = Bodies::<L>::gather(records, &section.second[places.clone()]);
+            touches.put_relative(lane, &geometry::relative(&a, &b, &section.shift[places], input.motion), content);
+        }
+    }
+    for (block, touches) in blocks.zip(touches) {
+        for lane in lanes() {
+            let pair = geometry::touch(&touches.relative::<L>(lane));
+            touches.put_touch(lane, &pair, content.range);
+            // Written so that NaN counts as a fault.
+            let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
+            if excess.is_none() && L::any(pair.touching & !within) {
+                let (fraction, place) = (input.max_overlap_fraction, block * BLOCK + lane);
+                excess = first_excess(pair.touching, pair.touch.overlap, pair.min_radius, fraction, place);
+            }
+        }
+    }
+    excess
+}
+
+/// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
+#[inline(always)]
+fn with_memory<L: Lane, T>(
+    memory: &mut [CacheLine],
+    columns: Range<usize>,
+    lane: usize,
+    alive: L::Mask,
+    law: impl FnOnce(&mut [L]) -> T,
+) -> T {
+    let zero = L::splat(0.0);
+    let mut values = [zero; MAX_MEMORY];
+    let memory = &mut memory[columns];
+    let values = &mut values[..memory.len()];
+    for (value, column) in values.iter_mut().zip(&*memory) {
+        *value = L::load(&column.0[lane..]);
+    }
+    let response = law(values);
+    for (value, column) in values.iter().zip(memory) {
+        L::select(alive, *value, zero).store(&mut column.0[lane..]);
+    }
+    response
 }
 
 /// The first lane that overlaps too much or is not a number.

@@ -68,7 +68,7 @@ pub fn touch(overlap: f64, overlap_rate: f64, effective_radius: f64, effective_m
         normal: [0.0, 0.0, 1.0],
         slip_velocity: [0.0; 3],
         relative_spin: [0.0; 3],
-        mean_spin: [0.0; 3],
+        spin_about_normal: 0.0,
     }
 }
 

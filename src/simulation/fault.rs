@@ -66,8 +66,8 @@ impl Simulation {
     }
 
     fn particle_json(&self, index: usize) -> Value {
-        let ParticleState { id, species, position, radius, velocity, full_velocity, spin, .. } =
-            self.particles.state(index);
+        let state = self.particles.state(index);
+        let ParticleState { id, species, position, radius, velocity, full_velocity, spin, .. } = state;
         let contacts: Vec<Value> = self
             .contacts
             .ends_of(index)
@@ -81,7 +81,8 @@ impl Simulation {
                 json!({ "low": key.low, "high": key.high, "shift": &key.shift[..3], "memory": memory })
             })
             .collect();
-        json!({ "id": id, "species": species, "position_m": position, "radius_m": radius, "velocity_m_per_s": velocity,
+        json!({ "id": id, "species": species, "position_m": position, "radius_m": radius,
+            "semi_axes_m": state.semi_axes, "orientation": state.orientation, "velocity_m_per_s": velocity,
             "full_step_velocity_m_per_s": full_velocity, "spin_rad_per_s": spin, "contacts": contacts })
     }
 }

@@ -4,6 +4,7 @@ use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
+use crate::force::touches::{BATCH, BlockTouches};
 use crate::integrate::gather::Lines;
 use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
 use std::ops::Range;
@@ -16,7 +17,20 @@ pub struct LineBuffers {
     /// Numbers per line, with the ledger's.
     pub stride: usize,
     kept: Vec<CacheLine>,
-    rings: Vec<Vec<CacheLine>>,
+    rings: Vec<Ring>,
+}
+
+/// What the thread of a strip writes and reads again soon.
+#[derive(Debug, Clone)]
+struct Ring {
+    lines: Vec<CacheLine>,
+    touches: Box<[BlockTouches; BATCH]>,
+}
+
+impl Default for Ring {
+    fn default() -> Self {
+        Self { lines: Vec::new(), touches: Box::new([BlockTouches::ZERO; BATCH]) }
+    }
 }
 
 impl LineBuffers {
@@ -31,9 +45,9 @@ impl LineBuffers {
         let cache_lines = |lines: usize| (lines * self.stride).div_ceil(size_of::<CacheLine>() / size_of::<f64>());
         let zero = CacheLine([0.0; BLOCK]);
         self.kept.resize(cache_lines(list.kept), zero);
-        self.rings.resize_with(list.strips.len(), Vec::new);
+        self.rings.resize_with(list.strips.len(), Ring::default);
         for (ring, strip) in self.rings.iter_mut().zip(&list.strips) {
-            ring.resize(cache_lines(strip.ring), zero);
+            ring.lines.resize(cache_lines(strip.ring), zero);
         }
     }
 }
@@ -86,13 +100,15 @@ impl Phase<'_> {
         sections: &mut [Section],
         bodies: BodyData,
         lines: LineRing,
+        touches: &mut [BlockTouches; BATCH],
     ) -> Option<PassFault> {
         if run.blocks == 0 {
             return None;
         }
         let section = &mut sections[run.section as usize - first_section];
         let blocks = run.block as usize..(run.block + run.blocks) as usize;
-        let excess = self.passes[section.pair].run(Job { input: &self.input, bodies, section, blocks, lines });
+        let excess =
+            self.passes[section.pair].run(Job { input: &self.input, bodies, section, blocks, lines, touches });
         excess.map(|(place, overlap_ratio)| PassFault { section: run.section as usize, place, overlap_ratio })
     }
 
@@ -108,12 +124,13 @@ impl Phase<'_> {
         let values = &mut bytemuck::cast_slice_mut(&mut lines.kept)[..*kept * lines.stride];
         let (low, high) = (partners[0] as usize - 1, partners[partners.len() - 1] as usize);
         let work = Work { strips, sections, first_section: 0 };
-        self.kept_strips(work, runs, low * *pairs..high * *pairs, 3 * *pairs, bodies, values)
+        self.kept_strips(work, &mut lines.rings, runs, low * *pairs..high * *pairs, 3 * *pairs, bodies, values)
     }
 
     fn kept_strips(
         &self,
         work: Work,
+        rings: &mut [Ring],
         runs: &[Run],
         wanted: Range<usize>,
         per_strip: usize,
@@ -129,9 +146,10 @@ impl Phase<'_> {
             let (low_lines, high_lines) =
                 lines.split_at_mut((high.strips[0].kept.start - first_line) * self.input.stride);
             let (low_runs, high_runs) = runs.split_at(low.strips.len() * per_strip);
+            let (low_rings, high_rings) = rings.split_at_mut(low.strips.len());
             let (a, b) = rayon::join(
-                || self.kept_strips(low, low_runs, wanted.clone(), per_strip, bodies, low_lines),
-                || self.kept_strips(high, high_runs, wanted.clone(), per_strip, bodies, high_lines),
+                || self.kept_strips(low, low_rings, low_runs, wanted.clone(), per_strip, bodies, low_lines),
+                || self.kept_strips(high, high_rings, high_runs, wanted.clone(), per_strip, bodies, high_lines),
             );
             return a.or(b);
         };
@@ -139,7 +157,8 @@ impl Phase<'_> {
         for run in &runs[wanted] {
             let first = run.line as usize - strip.kept.start;
             let ring = LineRing { values: &mut *lines, first, mask: usize::MAX };
-            let found = self.evaluate(run, work.first_section, work.sections, bodies, ring);
+            let touches = &mut rings[0].touches;
+            let found = self.evaluate(run, work.first_section, work.sections, bodies, ring, touches);
             fault = fault.or(found);
         }
         fault
@@ -175,7 +194,7 @@ impl Phase<'_> {
         &self,
         work: Work,
         mut slice: Slice,
-        rings: &mut [Vec<CacheLine>],
+        rings: &mut [Ring],
         view: &View,
         motion: &StepMotion,
     ) -> (StepResult, Option<PassFault>) {
@@ -194,25 +213,19 @@ impl Phase<'_> {
             return (a.0, a.1.or(b.1));
         };
         let (mut result, mut fault) = (StepResult::default(), None);
-        let ring: &mut [f64] = bytemuck::cast_slice_mut(&mut rings[0]);
+        let Ring { lines: ring, touches } = &mut rings[0];
+        let ring: &mut [f64] = bytemuck::cast_slice_mut(ring);
         let mask = strip.ring - 1;
         let pairs = strip.near.len() / strip.chunks().max(1);
         for chunk in 0..strip.chunks() {
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
-                let lines = LineRing { values: &mut *ring, first: run.line as usize - strip.first_line, mask };
+                let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
                 let bodies = BodyData { records: slice.record, shapes: slice.shape };
-                let found = self.evaluate(run, work.first_section, work.sections, bodies, lines);
+                let found = self.evaluate(run, work.first_section, work.sections, bodies, lines, touches);
                 fault = fault.or(found);
             }
-            let lines = Lines {
-                width: view.width,
-                stride: self.input.stride,
-                kept: view.kept,
-                ring: &*ring,
-                first: strip.first_line,
-                mask,
-            };
+            let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
             let batch = Batch { range, offsets: view.offsets, ends: view.ends, lines, motion };
             leap_frog::advance(&mut slice, batch, &mut result);

@@ -96,7 +96,8 @@ impl Particles {
             let mass = ellipsoid_mass(state.semi_axes, constants.density);
             let turns_by_shape = constants.driven || extras.ellipsoids;
             particles.record.push(Record {
-                position: state.position,
+                // Never −0: the contact pass counts on it.
+                position: state.position.map(|x| x + 0.0),
                 radius: state.radius,
                 velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },

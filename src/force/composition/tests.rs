@@ -102,7 +102,7 @@ fn touch(n: &[f64; 15]) -> Touch<f64> {
         normal,
         slip_velocity: std::array::from_fn(|k| slip[k] - along * normal[k]),
         relative_spin: [1e3 * n[8], 1e3 * n[9], 1e3 * n[10]],
-        mean_spin: [1e3 * n[11], 1e3 * n[12], 1e3 * n[13]],
+        spin_about_normal: 1e3 * n[11],
     }
 }
 
@@ -120,7 +120,7 @@ fn gather(touches: &[Touch<f64>]) -> Touch<Portable8> {
         normal: vector(&|t| t.normal),
         slip_velocity: vector(&|t| t.slip_velocity),
         relative_spin: vector(&|t| t.relative_spin),
-        mean_spin: vector(&|t| t.mean_spin),
+        spin_about_normal: lanes(&|t| t.spin_about_normal),
     }
 }
 

@@ -272,6 +272,7 @@ fn still() -> CellMotion {
     CellMotion {
         sides: [1.0; 3],
         shift: ShiftTable::new([1.0; 3]),
+        faces_move: true,
         shift_velocity: ShiftTable::new([0.0; 3]),
         gradient: [0.0; 3],
         wall_velocity: [0.0; 3],

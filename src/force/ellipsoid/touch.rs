@@ -33,7 +33,7 @@ pub struct Surroundings<'a> {
 }
 
 /// Numbers of an [`EllipsoidTouch`].
-const NUMBERS: usize = 35;
+const NUMBERS: usize = 33;
 
 /// The touches of one block.
 #[derive(Debug, Clone)]
@@ -202,7 +202,7 @@ pub fn ellipsoids<L: Lane>(
         normal,
         slip_velocity: sub(velocity, scale(normal, approach)),
         relative_spin: sub(b.spin, a.spin),
-        mean_spin: scale(add(a.spin, b.spin), half),
+        spin_about_normal: half * dot(add(a.spin, b.spin), normal),
     };
     let pair = PairTouch {
         touching: !(L::splat(TOUCH_TOLERANCE) * heights).at_least(overlap),
@@ -261,12 +261,12 @@ impl<L: Lane> EllipsoidTouch<L> {
             self.pair;
         let flag = L::select(touching, L::splat(1.0), L::splat(0.0));
         let [r, s] = self.arms;
-        let (n, slip, spin, mean) = (t.normal, t.slip_velocity, t.relative_spin, t.mean_spin);
+        let (n, slip, spin) = (t.normal, t.slip_velocity, t.relative_spin);
         #[rustfmt::skip]
         let numbers = [
             flag, t.overlap, t.overlap_rate, t.effective_radius, t.radius_factor, t.overlap_factor, t.size,
             t.effective_mass, n[0], n[1], n[2], slip[0], slip[1], slip[2], spin[0], spin[1], spin[2],
-            mean[0], mean[1], mean[2], branch[0], branch[1], branch[2], v[0], v[1], v[2],
+            t.spin_about_normal, branch[0], branch[1], branch[2], v[0], v[1], v[2],
             arm_first, arm_second, min_radius, r[0], r[1], r[2], s[0], s[1], s[2],
         ];
         numbers
@@ -286,17 +286,17 @@ impl<L: Lane> EllipsoidTouch<L> {
             normal: vector(8),
             slip_velocity: vector(11),
             relative_spin: vector(14),
-            mean_spin: vector(17),
+            spin_about_normal: x[17],
         };
         let pair = PairTouch {
             touching: x[0].greater(L::splat(0.5)),
             touch,
-            branch: vector(20),
-            imposed_velocity: vector(23),
-            arm_first: x[26],
-            arm_second: x[27],
-            min_radius: x[28],
+            branch: vector(18),
+            imposed_velocity: vector(21),
+            arm_first: x[24],
+            arm_second: x[25],
+            min_radius: x[26],
         };
-        Self { pair, arms: [vector(29), vector(32)] }
+        Self { pair, arms: [vector(27), vector(30)] }
     }
 }

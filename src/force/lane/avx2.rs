@@ -78,17 +78,11 @@ pub fn address(records: &[Record], index: u32) -> *const f64 {
     (&raw const records[index as usize]).cast()
 }
 
-/// Ask for both cache lines of some records.
+/// Ask for the cache line at an address.
 #[inline(always)]
-pub fn prefetch(records: &[Record], index: &[u32]) {
-    for place in index {
-        let record = records.as_ptr().wrapping_add(*place as usize).cast::<i8>();
-        // SAFETY: a prefetch is a hint: it never faults, whatever the address.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(record);
-            _mm_prefetch::<_MM_HINT_T0>(record.wrapping_add(64));
-        }
-    }
+pub fn prefetch_at(address: *const i8) {
+    // SAFETY: a prefetch is a hint that every x86-64 processor knows; it never faults, whatever the address.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
 }
 
 impl Lane for F64x4 {
@@ -202,9 +196,5 @@ impl Lane for F64x4 {
     fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {
         let values: [f64; 4] = std::array::from_fn(|k| table[usize::from((codes[k] >> bits) & 7)]);
         Self::load(&values)
-    }
-    #[inline(always)]
-    fn prefetch(records: &[Record], index: &[u32]) {
-        prefetch(records, &index[..4]);
     }
 }

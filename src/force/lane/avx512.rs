@@ -71,18 +71,38 @@ impl Not for Mask8 {
     }
 }
 
-/// Transposes the 4 × 4 blocks in the lower and the upper halves of four registers.
+/// The four columns of eight rows of four numbers: `rows[0]` holds rows 0 and 2 one after the other, `rows[1]`
+/// rows 1 and 3, `rows[2]` rows 4 and 6, `rows[3]` rows 5 and 7.
 ///
 /// # Safety
 /// The processor has AVX-512 F.
 #[inline(always)]
-unsafe fn transpose(rows: [__m512d; 4]) -> [__m512d; 4] {
+unsafe fn columns(rows: [__m512d; 4]) -> [__m512d; 4] {
+    // SAFETY: as the function's.
+    unsafe {
+        let (low, high) = (_mm512_unpacklo_pd(rows[0], rows[1]), _mm512_unpacklo_pd(rows[2], rows[3]));
+        let (low_odd, high_odd) = (_mm512_unpackhi_pd(rows[0], rows[1]), _mm512_unpackhi_pd(rows[2], rows[3]));
+        [
+            _mm512_shuffle_f64x2::<0b10_00_10_00>(low, high),
+            _mm512_shuffle_f64x2::<0b10_00_10_00>(low_odd, high_odd),
+            _mm512_shuffle_f64x2::<0b11_01_11_01>(low, high),
+            _mm512_shuffle_f64x2::<0b11_01_11_01>(low_odd, high_odd),
+        ]
+    }
+}
+
+/// Eight rows of four numbers from their columns: entry `k` holds rows `k` and `k + 4` one after the other.
+///
+/// # Safety
+/// The processor has AVX-512 F.
+#[inline(always)]
+unsafe fn rows(columns: [__m512d; 4]) -> [__m512d; 4] {
     // SAFETY: as the function's.
     unsafe {
         let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
         let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-        let even = [_mm512_unpacklo_pd(rows[0], rows[1]), _mm512_unpacklo_pd(rows[2], rows[3])];
-        let odd = [_mm512_unpackhi_pd(rows[0], rows[1]), _mm512_unpackhi_pd(rows[2], rows[3])];
+        let even = [_mm512_unpacklo_pd(columns[0], columns[1]), _mm512_unpacklo_pd(columns[2], columns[3])];
+        let odd = [_mm512_unpackhi_pd(columns[0], columns[1]), _mm512_unpackhi_pd(columns[2], columns[3])];
         [
             _mm512_permutex2var_pd(even[0], low, even[1]),
             _mm512_permutex2var_pd(odd[0], low, odd[1]),
@@ -187,11 +207,11 @@ impl Lane for F64x8 {
             // SAFETY: the processor has AVX-512 (head of this file); each row points at the twelve numbers of
             // a record, of which four are read from 4·group on.
             let [x, y, z, w] = unsafe {
-                transpose([
-                    two_rows(row[0], row[4], 4 * group),
-                    two_rows(row[1], row[5], 4 * group),
-                    two_rows(row[2], row[6], 4 * group),
-                    two_rows(row[3], row[7], 4 * group),
+                self::columns([
+                    two_rows(row[0], row[2], 4 * group),
+                    two_rows(row[1], row[3], 4 * group),
+                    two_rows(row[4], row[6], 4 * group),
+                    two_rows(row[5], row[7], 4 * group),
                 ])
             };
             columns[4 * group] = Self(x);
@@ -208,7 +228,7 @@ impl Lane for F64x8 {
         // SAFETY: the processor has AVX-512 (head of this file); the last of the four numbers written per
         // row, at 7·stride + offset + 3, lies inside the slice.
         unsafe {
-            let lines = transpose([values[0].0, values[1].0, values[2].0, values[3].0]);
+            let lines = self::rows([values[0].0, values[1].0, values[2].0, values[3].0]);
             for k in 0..4 {
                 _mm256_storeu_pd(start.add(k * stride + offset), _mm512_castpd512_pd256(lines[k]));
                 _mm256_storeu_pd(start.add((k + 4) * stride + offset), _mm512_extractf64x4_pd::<1>(lines[k]));
@@ -225,9 +245,5 @@ impl Lane for F64x8 {
             let index = _mm512_srl_epi64(wide, _mm_cvtsi32_si128(bits.cast_signed()));
             Self(_mm512_permutexvar_pd(index, _mm512_loadu_pd(table.as_ptr())))
         }
-    }
-    #[inline(always)]
-    fn prefetch(records: &[Record], index: &[u32]) {
-        super::avx2::prefetch(records, &index[..8]);
     }
 }

@@ -103,11 +103,11 @@ fn the_stored_force_turns_rigidly_with_a_rolling_and_spinning_contact() {
     let start = sliding(OVERLAP, 1e-3);
     law.evaluate(&start, &normal(&start), &mut memory);
     let before = length([memory[0], memory[1], memory[2]]);
-    // A quarter turn of the normal from z to x, about y, with a mean spin that does not matter.
+    // A quarter turn of the normal from z to x, about y.
     for k in 1..=1000 {
         let angle = std::f64::consts::FRAC_PI_2 * f64::from(k) / 1000.0;
         let normal_vector = [libm::sin(angle), 0.0, libm::cos(angle)];
-        let touch = Touch { normal: normal_vector, slip_velocity: [0.0; 3], mean_spin: [0.0, 7.0, 0.0], ..start };
+        let touch = Touch { normal: normal_vector, slip_velocity: [0.0; 3], ..start };
         let force = law.evaluate(&touch, &normal(&touch), &mut memory).value;
         assert!((length(force) / before - 1.0).abs() < 1e-12);
         assert!(dot(force, normal_vector).abs() < 1e-14 * before);
@@ -116,7 +116,7 @@ fn the_stored_force_turns_rigidly_with_a_rolling_and_spinning_contact() {
     // A quarter turn about the normal x: from −z to +y.
     let spin = std::f64::consts::FRAC_PI_2;
     for _ in 0..1000 {
-        let touch = Touch { normal: [1.0, 0.0, 0.0], slip_velocity: [0.0; 3], mean_spin: [spin, 0.0, 0.0], ..start };
+        let touch = Touch { normal: [1.0, 0.0, 0.0], slip_velocity: [0.0; 3], spin_about_normal: spin, ..start };
         law.evaluate(&touch, &normal(&touch), &mut memory);
     }
     assert!((memory[1] / before - 1.0).abs() < 1e-11, "{memory:?}");

@@ -57,7 +57,7 @@ impl<C: ContactLaw> LawPass<C> {
 
     #[inline(always)]
     fn ellipsoids<L: Lane>(&self, job: Job) -> Excess {
-        let Job { input, bodies, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines, .. } = job;
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
         let start = blocks.start * BLOCK;
@@ -83,7 +83,7 @@ impl<C: ContactLaw> LawPass<C> {
     }
 
     fn ellipsoid_walls(&self, job: Job) -> Excess {
-        let Job { input, bodies, section, blocks, lines } = job;
+        let Job { input, bodies, section, blocks, lines, .. } = job;
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;

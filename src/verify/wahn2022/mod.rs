@@ -3,7 +3,7 @@
 //! it; the figures know run directories only.
 
 mod assembly;
-mod check;
+pub(super) mod check;
 mod curves;
 mod job;
 mod nmc;

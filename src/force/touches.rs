@@ -1,0 +1,206 @@
+//! What a batch of blocks passes on from one stage of the contact pass to the next: the bodies relative to each
+//! other, then the touch, then the normal law's answer. Several short loops in place of a long one keep more
+//! blocks under way at a time within the processor; and geometry is compiled once, whatever the number of laws.
+
+use super::geometry::{PairTouch, Relative};
+use super::lane::{Lane, Vector};
+use super::law::{Energies, NormalResponse, Touch};
+use crate::contact::section::{BLOCK, CacheLine};
+
+/// Blocks in a batch: few, so that they stay in the nearest cache.
+pub const BATCH: usize = 4;
+
+/// Stands for the overlap of lanes whose law is not asked.
+const DEAD: f64 = f64::NEG_INFINITY;
+
+/// What is passed on only where it is used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Content {
+    /// Relative spins, for rolling laws.
+    pub rolling: bool,
+    /// Imposed velocities and energies, for the energy ledger.
+    pub ledger: bool,
+    /// The normal law's [`super::law::NormalLaw::range`], 0 if its memory ends with the touch.
+    pub range: f64,
+}
+
+/// Some numbers of each contact of a block.
+#[derive(Debug, Clone, Copy)]
+struct Numbers<const N: usize>([CacheLine; N]);
+
+impl<const N: usize> Numbers<N> {
+    const ZERO: Self = Self([CacheLine([0.0; BLOCK]); N]);
+
+    #[inline(always)]
+    fn put<L: Lane>(&mut self, number: usize, lane: usize, values: &[L]) {
+        for (line, value) in self.0[number..].iter_mut().zip(values) {
+            value.store(&mut line.0[lane..]);
+        }
+    }
+
+    #[inline(always)]
+    fn one<L: Lane>(&self, number: usize, lane: usize) -> L {
+        L::load(&self.0[number].0[lane..])
+    }
+
+    #[inline(always)]
+    fn vector<L: Lane>(&self, number: usize, lane: usize) -> Vector<L> {
+        [self.one(number, lane), self.one(number + 1, lane), self.one(number + 2, lane)]
+    }
+}
+
+/// The contacts of one block between the stages.
+#[derive(Debug, Clone, Copy)]
+pub struct BlockTouches {
+    relative: Numbers<15>,
+    touch: Numbers<13>,
+    normal: Numbers<3>,
+    /// Relative spin, if there is rolling.
+    relative_spin: Numbers<3>,
+    /// Imposed velocity, if there is a ledger.
+    imposed_velocity: Numbers<3>,
+    /// Energies of the normal law, if there is a ledger.
+    energies: Numbers<4>,
+}
+
+impl BlockTouches {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        relative: Numbers::ZERO,
+        touch: Numbers::ZERO,
+        normal: Numbers::ZERO,
+        relative_spin: Numbers::ZERO,
+        imposed_velocity: Numbers::ZERO,
+        energies: Numbers::ZERO,
+    };
+
+    /// Take in the bodies of the lanes from `lane` on.
+    #[inline(always)]
+    pub fn put_relative<L: Lane>(&mut self, lane: usize, pair: &Relative<L>, content: Content) {
+        self.relative.put(0, lane, &pair.branch);
+        self.relative.put(3, lane, &pair.velocity);
+        self.relative.put(6, lane, &pair.rim_velocity);
+        self.relative.put(9, lane, &pair.spin_sum);
+        self.relative.put(12, lane, &pair.radii);
+        self.relative.put(14, lane, &[pair.inverse_masses]);
+        if content.rolling {
+            self.relative_spin.put(0, lane, &pair.relative_spin);
+        }
+        if content.ledger {
+            self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
+        }
+    }
+
+    /// The bodies of the lanes from `lane` on; what is not passed on means nothing.
+    #[inline(always)]
+    #[must_use]
+    pub fn relative<L: Lane>(&self, lane: usize) -> Relative<L> {
+        Relative {
+            branch: self.relative.vector(0, lane),
+            velocity: self.relative.vector(3, lane),
+            rim_velocity: self.relative.vector(6, lane),
+            spin_sum: self.relative.vector(9, lane),
+            radii: [self.relative.one(12, lane), self.relative.one(13, lane)],
+            inverse_masses: self.relative.one(14, lane),
+            relative_spin: self.relative_spin.vector(0, lane),
+            imposed_velocity: self.imposed_velocity.vector(0, lane),
+        }
+    }
+
+    /// Take in the touches of the lanes from `lane` on.
+    #[inline(always)]
+    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>, range: f64) {
+        let touch = &pair.touch;
+        let overlap = L::select(pair.alive(range), touch.overlap, L::splat(DEAD));
+        self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_radius, touch.effective_mass]);
+        self.touch.put(4, lane, &touch.normal);
+        self.touch.put(7, lane, &touch.slip_velocity);
+        self.touch.put(10, lane, &[touch.spin_about_normal, pair.arm_first, pair.arm_second]);
+    }
+
+    /// The touches of the lanes from `lane` on; what is not passed on means nothing.
+    #[inline(always)]
+    #[must_use]
+    pub fn touch<L: Lane>(&self, lane: usize) -> LawTouch<L> {
+        let overlap = self.touch.one(0, lane);
+        LawTouch {
+            // NaN is alive.
+            alive: !L::splat(DEAD).at_least(overlap),
+            touch: Touch {
+                overlap,
+                overlap_rate: self.touch.one(1, lane),
+                effective_radius: self.touch.one(2, lane),
+                radius_factor: L::splat(1.0),
+                overlap_factor: L::splat(1.0),
+                size: self.relative.one::<L>(12, lane) + self.relative.one(13, lane),
+                effective_mass: self.touch.one(3, lane),
+                normal: self.touch.vector(4, lane),
+                slip_velocity: self.touch.vector(7, lane),
+                spin_about_normal: self.touch.one(10, lane),
+                relative_spin: self.relative_spin.vector(0, lane),
+            },
+            arm_first: self.touch.one(11, lane),
+            arm_second: self.touch.one(12, lane),
+            imposed_velocity: self.imposed_velocity.vector(0, lane),
+        }
+    }
+
+    /// Take in the normal law's answer.
+    #[inline(always)]
+    pub fn put_normal<L: Lane>(&mut self, lane: usize, normal: &NormalResponse<L>, ledger: bool) {
+        self.normal.put(0, lane, &[normal.force, normal.contact_radius, normal.dashpot]);
+        if ledger {
+            let e = &normal.energies;
+            self.energies.put(0, lane, &[e.damping, e.viscous, e.friction, e.plastic]);
+        }
+    }
+
+    /// The normal law's answer, without stiffness and held energies.
+    #[inline(always)]
+    #[must_use]
+    pub fn normal<L: Lane>(&self, lane: usize) -> NormalResponse<L> {
+        NormalResponse {
+            force: self.normal.one(0, lane),
+            contact_radius: self.normal.one(1, lane),
+            dashpot: self.normal.one(2, lane),
+            stiffness: L::splat(0.0),
+            energies: Energies {
+                damping: self.energies.one(0, lane),
+                viscous: self.energies.one(1, lane),
+                friction: self.energies.one(2, lane),
+                plastic: self.energies.one(3, lane),
+                ..Energies::zero()
+            },
+        }
+    }
+}
+
+/// What the laws' loops need of some touches.
+#[derive(Debug, Clone, Copy)]
+pub struct LawTouch<L: Lane> {
+    /// Lanes whose law is asked.
+    pub alive: L::Mask,
+    /// The law's view.
+    pub touch: Touch<L>,
+    /// Distance of the contact point from the first's centre along n \[m\].
+    pub arm_first: L,
+    /// Distance of the contact point from the second's centre \[m\].
+    pub arm_second: L,
+    /// The part of the relative velocity that the cell's motion imposes \[m/s\].
+    pub imposed_velocity: Vector<L>,
+}
+
+impl<L: Lane> LawTouch<L> {
+    /// Straight from geometry, for a law of this range.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(pair: &PairTouch<L>, range: f64) -> Self {
+        Self {
+            alive: pair.alive(range),
+            touch: pair.touch,
+            arm_first: pair.arm_first,
+            arm_second: pair.arm_second,
+            imposed_velocity: pair.imposed_velocity,
+        }
+    }
+}
