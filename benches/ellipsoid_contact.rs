@@ -128,6 +128,7 @@ fn main() {
         shift_velocity: ShiftTable::new([0.0; 3]),
         gradient: [0.0; 3],
         wall_velocity: [0.0; 3],
+        faces_move: false,
     };
     println!("aspect  start  evaluations mean  most   ns per contact");
     for aspect in [1.5, 2.0, 5.0] {

@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::exchange::{
     Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum, redistribute,
 };
+use crate::force::cautions::{self, Sizes};
 use crate::force::pass;
 use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
@@ -16,7 +17,7 @@ use crate::output::checkpoint::Checkpoint;
 use crate::packing::{self, Packing, Worst};
 use crate::simulation::{Model, Simulation};
 use crate::state::particles::SpeciesConstants;
-use crate::state::shape::{ellipsoid_mass, is_sphere};
+use crate::state::shape::{ellipsoid_mass, is_sphere, smallest_semi_axis};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
 use std::ops::Range;
 use std::sync::Arc;
@@ -41,6 +42,7 @@ struct Extremes {
     max_spin: f64,
     ellipsoids: bool,
     solid_volume: f64,
+    sizes: Sizes,
 }
 
 /// The packing as initial state. A packing that is neither replicated nor perturbed lies on rank 0, the
@@ -181,6 +183,9 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         skin: 0.0,
     };
     let turns = passes.iter().any(|pass| pass.stride() > 4) || extremes.max_spin > 0.0 || extremes.ellipsoids;
+    let mut cautions: Vec<String> =
+        config.pairs.iter().filter_map(|pair| cautions::of_pair(pair, extremes.sizes)).collect();
+    cautions.dedup();
     let model = Model {
         config: Arc::clone(config),
         species,
@@ -192,6 +197,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         solid_volume: extremes.solid_volume,
         ellipsoids: extremes.ellipsoids,
         rotation: turns,
+        cautions,
         simd: agree(comm, Simd::choose(config.parallel.simd))?,
     };
     agree(comm, check_fit(&model, initial))?;
@@ -207,7 +213,7 @@ fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
             initial.memory.width
         )));
     }
-    let reach = 2.0 * model.max_radius * (1.0 + model.config.parallel.skin);
+    let reach = 2.0 * model.max_radius + model.outer_skin();
     for (axis, side) in initial.global.sides.iter().enumerate() {
         // Contacts carry image shifts of at most three: one for the wrap and two for the reach.
         if model.lists.walls[axis].is_none() && 2.0 * side <= reach {
@@ -222,8 +228,8 @@ fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
 }
 
 fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[ParticleState]) -> Extremes {
-    let mut low = [f64::INFINITY];
-    let mut high = [0.0_f64; 4];
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [0.0_f64; 5];
     let mut volume = [ExactSum::new()];
     let raise = |place: &mut f64, value: f64| {
         if value > *place {
@@ -238,6 +244,11 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
         for spin in particle.spin {
             raise(&mut high[2], spin.abs());
         }
+        let smallest = smallest_semi_axis(particle.semi_axes);
+        if smallest < low[1] {
+            low[1] = smallest;
+        }
+        raise(&mut high[4], particle.radius / smallest);
         if !is_sphere(particle.semi_axes) {
             high[3] = 1.0;
         }
@@ -258,6 +269,7 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
         max_spin: high[2],
         ellipsoids: high[3] > 0.0,
         solid_volume: volume[0].value(),
+        sizes: Sizes { smallest: low[1], aspect_ratio: high[4] },
     }
 }
 

@@ -85,3 +85,21 @@ fn a_restart_in_the_middle_changes_nothing_on_any_rank_count() {
         assert_eq!(String::from_utf8_lossy(&told.stdout).trim(), reference.0);
     }
 }
+
+#[test]
+fn dents_and_necks_survive_a_restart_on_any_rank_count() {
+    let config = data("dents.toml");
+    let run = |directory: &Path, ranks: usize, extra: &[&str]| {
+        let output = launch(&Run { config: &config, ranks, threads: 1 }, directory, extra);
+        assert!(output.status.success(), "{}", text(&output));
+        (digest_of(&output), history_of(directory))
+    };
+    let reference = run(&scratch("dents"), 1, &[]);
+    for ranks in [1, 2, 4] {
+        let directory = scratch("dents_half");
+        run(&directory, 2, &[]);
+        let half = directory.join("checkpoint-000000000500.h5");
+        let again = run(&directory, ranks, &["--restart", half.to_str().expect("a UTF-8 path")]);
+        assert_eq!(again, reference, "{ranks} ranks");
+    }
+}

@@ -69,6 +69,20 @@ fn walls_and_gravity_have_the_same_bits_over_ranks() {
 }
 
 #[test]
+fn dents_and_necks_have_the_same_bits_over_ranks_threads_and_skins() {
+    // The memory must reach farther than the thinnest skin.
+    let config = data("dents.toml");
+    let reference = outcome("dents", &Run { config: &config, ranks: 1, threads: 1 }, &[]);
+    for (ranks, threads, skin) in [(1, 2, "0.01"), (2, 1, "0.3"), (3, 1, "0.02"), (4, 2, "0.1"), (8, 1, "0.05")] {
+        let skin = format!("parallel.skin={skin}");
+        let got = outcome("dents", &Run { config: &config, ranks, threads }, &["--set", &skin]);
+        assert_eq!(got, reference, "{ranks} ranks, {threads} threads, {skin}");
+    }
+    let scalar = ["--set", "parallel.simd=scalar"];
+    assert_eq!(outcome("dents", &Run { config: &config, ranks: 1, threads: 1 }, &scalar), reference);
+}
+
+#[test]
 fn threads_that_share_the_work_give_the_same_bits() {
     // Large enough that the pass really splits (the small cases run serially whatever is asked).
     let config = data("dense_box.toml");

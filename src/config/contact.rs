@@ -88,14 +88,15 @@ struct Override<'a> {
     section: Section<'a>,
     materials: [usize; 2],
     laws: Laws,
-    /// Restitution, friction, rolling friction, twisting friction.
-    constants: [Option<f64>; 4],
+    /// In the order of [`CONSTANTS`].
+    constants: [Option<f64>; 5],
 }
 
-const CONSTANTS: [&str; 4] = ["restitution", "friction", "rolling_friction", "twisting_friction"];
+const CONSTANTS: [&str; 5] = ["restitution", "friction", "rolling_friction", "twisting_friction", "surface_energy"];
 
-fn constants_of(material: &Material) -> [f64; 4] {
-    [material.restitution, material.friction, material.rolling_friction, material.twisting_friction]
+fn constants_of(material: &Material) -> [f64; 5] {
+    let m = material;
+    [m.restitution, m.friction, m.rolling_friction, m.twisting_friction, m.surface_energy]
 }
 
 fn read_overrides<'a>(root: &Section<'a>, names: &[String]) -> Vec<Override<'a>> {
@@ -176,7 +177,7 @@ fn make_pair(
     let tangential = special.and_then(|o| o.laws.tangential.clone()).or_else(|| common.tangential.clone())?;
     let rolling = special.and_then(|o| o.laws.rolling.clone()).or_else(|| common.rolling.clone())?;
     let both = [constants_of(first), constants_of(second)];
-    let constants = [0, 1, 2, 3].map(|k| {
+    let constants = [0, 1, 2, 3, 4].map(|k| {
         let own = special.and_then(|o| o.constants[k]);
         if own.is_none() && both[0][k] != both[1][k] {
             let message = format!(
@@ -202,6 +203,7 @@ fn make_pair(
         friction: constants[1],
         rolling_friction: constants[2],
         twisting_friction: constants[3],
+        surface_energy: constants[4],
     };
     let chosen = [("normal", Some(&normal)), ("tangential", tangential.as_ref()), ("rolling", rolling.as_ref())];
     for (role, choice) in chosen {

@@ -147,6 +147,12 @@ pub static PAIR: Table = Table {
             Derived("that of the materials, if equal"),
             "Twisting friction coefficient.",
         ),
+        key(
+            "surface_energy",
+            number(Dimension::SURFACE_ENERGY, Range::NOT_NEGATIVE),
+            Derived("that of the materials, if equal"),
+            "Work of adhesion between the two surfaces.",
+        ),
     ],
 };
 

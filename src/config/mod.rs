@@ -139,6 +139,8 @@ pub struct Material {
     pub rolling_friction: f64,
     /// Twisting friction coefficient μ_tw.
     pub twisting_friction: f64,
+    /// Work of adhesion between two surfaces of this material \[J/m²\].
+    pub surface_energy: f64,
 }
 
 /// The distribution of radii of a species.

@@ -55,6 +55,7 @@ fn read_material(section: &Section) -> Option<Material> {
     let restitution = section.number("restitution");
     let rolling_friction = section.number("rolling_friction");
     let twisting_friction = section.number("twisting_friction");
+    let surface_energy = section.number("surface_energy");
     let maxwell: Vec<Option<MaxwellBranch>> = section.list("maxwell").iter().map(read_branch).collect();
     Some(Material {
         name: name?,
@@ -68,6 +69,7 @@ fn read_material(section: &Section) -> Option<Material> {
         restitution: restitution?,
         rolling_friction: rolling_friction?,
         twisting_friction: twisting_friction?,
+        surface_energy: surface_energy?,
     })
 }
 

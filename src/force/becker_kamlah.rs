@@ -193,6 +193,21 @@ impl BeckerKamlah {
     }
 }
 
+/// Largest aspect ratio of the particles to which the constants are fitted (B: 0.5 to 2).
+const FITTED_ASPECT_RATIO: f64 = 2.0;
+
+/// Warns of particles beyond the range to which the constants are fitted.
+#[must_use]
+pub fn caution(aspect_ratio: f64) -> Option<String> {
+    (aspect_ratio > FITTED_ASPECT_RATIO * (1.0 + 1e-12)).then(|| {
+        format!(
+            "becker_kamlah: semi-axes of one particle differ by a factor of {aspect_ratio:.3}, and the constants are fitted \
+             to ratios up to {FITTED_ASPECT_RATIO}: give your own pressure_* and radius_* or take the forces as an \
+             extrapolation"
+        )
+    })
+}
+
 /// Hands the law of a pair to the visitor.
 pub fn build<V: NormalVisitor>(pair: &PairConfig, visitor: V) -> V::Output {
     visitor.visit(BeckerKamlah::new(pair), ShearSprings::elastic(&pair.properties))

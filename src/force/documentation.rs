@@ -81,6 +81,7 @@ fn example_pair(law: &'static LawEntry) -> PairConfig {
             friction: 0.5,
             rolling_friction: 0.1,
             twisting_friction: 0.1,
+            surface_energy: 0.1,
         },
         normal: law.with_defaults(),
         tangential: None,

@@ -1,6 +1,7 @@
 //! Contact laws: pure functions of one touch and that contact's own memory, and the loop around them.
 
 pub mod becker_kamlah;
+pub mod cautions;
 pub mod composition;
 pub mod dashpot;
 mod documentation;
@@ -22,4 +23,5 @@ pub mod slider;
 #[cfg(test)]
 mod testing;
 pub mod thornton;
+pub mod thornton_ning;
 pub mod touches;

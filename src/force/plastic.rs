@@ -72,6 +72,13 @@ pub fn check(properties: &PairProperties) -> Result<(), String> {
     Ok(())
 }
 
+/// Lower yield stress of a pair \[Pa\], infinite where nothing yields.
+#[must_use]
+pub fn lower_yield_stress(properties: &PairProperties) -> f64 {
+    let given = properties.yield_stress.iter().flatten();
+    given.fold(f64::INFINITY, |least, y| if *y < least { *y } else { least })
+}
+
 /// Where the contact of a touch begins to yield.
 #[derive(Debug, Clone, Copy)]
 pub struct Yield<L> {
@@ -118,8 +125,7 @@ impl Plastic {
     #[must_use]
     pub fn new(pair: &PairConfig) -> Self {
         let effective_modulus = pair.properties.effective_young_modulus();
-        let given = pair.properties.yield_stress.iter().flatten();
-        let yield_stress = given.fold(f64::INFINITY, |least, y| if *y < least { *y } else { least });
+        let yield_stress = lower_yield_stress(&pair.properties);
         let choice: &LawChoice = &pair.normal;
         Self {
             effective_modulus,

@@ -51,7 +51,8 @@ register! {
         becker_kamlah
         hertz
         maxwell_zener
-        thornton;
+        thornton
+        thornton_ning;
     tangential:
         mindlin;
     rolling:
@@ -220,6 +221,8 @@ pub struct PairProperties {
     pub rolling_friction: f64,
     /// Twisting friction coefficient of the pair.
     pub twisting_friction: f64,
+    /// Work of adhesion of the pair \[J/m²\].
+    pub surface_energy: f64,
 }
 
 impl PairProperties {

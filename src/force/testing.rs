@@ -22,6 +22,7 @@ pub fn properties(young_modulus: f64, poisson_ratio: f64, maxwell: Vec<MaxwellBr
         friction: 0.4,
         rolling_friction: 0.05,
         twisting_friction: 0.02,
+        surface_energy: 1e-4,
     }
 }
 

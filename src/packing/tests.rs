@@ -97,6 +97,7 @@ fn a_data_file_brings_its_cell_and_must_have_the_density_of_the_material() {
             restitution: 1.0,
             rolling_friction: 0.0,
             twisting_friction: 0.0,
+            surface_energy: 0.0,
         }];
         match build(&given) {
             Ok(packing) => assert!(fits && packing.sides == [1.0, 2.0, 3.0]),

@@ -57,6 +57,8 @@ pub struct Model {
     pub ellipsoids: bool,
     /// Some particle turns or can be made to turn.
     pub rotation: bool,
+    /// What the user should know of laws beside these particles.
+    pub cautions: Vec<String>,
     /// Instructions that the passes use.
     pub simd: Simd,
 }
@@ -162,7 +164,7 @@ impl Simulation {
             max_stiffness: 0.0,
             prepared_for: None,
             warned_about_time_step: false,
-            warnings: Vec::new(),
+            warnings: model.cautions.clone(),
             model,
         };
         simulation.rebuild_all(memory)?;

@@ -25,11 +25,13 @@ impl Dimension {
     pub const VISCOSITY: Self = Self([-1, 1, -1, 0, 0]);
     /// 1/s: strain rates and angular velocities
     pub const RATE: Self = Self([0, 0, -1, 0, 0]);
+    /// J/m² = N/m
+    pub const SURFACE_ENERGY: Self = Self([0, 1, -2, 0, 0]);
     /// N
     pub const FORCE: Self = Self([1, 1, -2, 0, 0]);
 
     /// Dimensions with a name of their own: dimension, name with article, SI unit.
-    const NAMED: [(Self, &'static str, &'static str); 11] = [
+    const NAMED: [(Self, &'static str, &'static str); 12] = [
         (Self::NONE, "a plain number", ""),
         (Self::LENGTH, "a length", "m"),
         (Self::MASS, "a mass", "kg"),
@@ -41,6 +43,7 @@ impl Dimension {
         (Self::VISCOSITY, "a viscosity", "Pa s"),
         (Self::RATE, "a rate", "1/s"),
         (Self::FORCE, "a force", "N"),
+        (Self::SURFACE_ENERGY, "a surface energy", "J/m^2"),
     ];
 
     /// The SI unit as text that the parser accepts; empty for plain numbers.

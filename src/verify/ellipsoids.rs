@@ -130,7 +130,10 @@ fn drifts(scene: &Scene) -> Result<([f64; 2], f64, f64)> {
     Ok(([change(p, q) / size(p1), change(l, m) / size(l1)], f / e - 1.0, (f1 - e1).abs() / e))
 }
 
-/// An off-centre impact keeps momentum and angular momentum to rounding, elastic also energy to second order.
+/// An off-centre impact keeps momentum and angular momentum to rounding. It keeps energy only as far as the contact
+/// stays where it is: Hertz's force between ellipsoids has no potential while the contact rolls to places of other
+/// curvature, so the change of energy does not depend on the time step and goes with the length of the contact, to
+/// nothing for stiff bodies.
 pub fn conservation() -> Result<Vec<Claim>> {
     const ELASTIC: &str = "[contact.normal.hertz]\ndamping = \"none\"";
     const ROUGH: &str = "[contact.normal.hertz]\n[contact.tangential.mindlin]\n[contact.rolling.spring_slider]";
@@ -142,9 +145,11 @@ pub fn conservation() -> Result<Vec<Claim>> {
         claims.push(Claim::bounded(format!("{name}: drift of angular momentum"), 1e-11, drift[1]));
         claims.push(Claim::absolute(format!("{name}: the bodies met (1)"), 1.0, f64::from(exchanged > 0.01), 0.0));
         if name == "elastic" {
-            let finer = drifts(&impact(2.5e-7, laws, material))?.1;
-            claims.push(Claim::bounded("elastic: change of energy", 1e-5, energy));
-            claims.push(Claim::relative("elastic: change of energy, step over half step", 4.0, energy / finer, 0.25));
+            claims.push(Claim::bounded("elastic: change of energy", 1e-2, energy));
+            // The contact lasts as the modulus to the power −2/5.
+            let stiffer = material.replace("50 MPa", "50 GPa");
+            let stiff = drifts(&impact(5e-7 / 16.0, laws, &stiffer))?.1;
+            claims.push(Claim::bounded("elastic, 1000 times stiffer: change of energy", 5e-4, stiff));
         } else {
             claims.push(Claim::absolute("rough: energy is lost (1)", 1.0, f64::from(energy < -0.01), 0.0));
         }

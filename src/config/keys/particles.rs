@@ -39,6 +39,12 @@ pub static MATERIAL: Table = Table {
         ),
         key("rolling_friction", COEFFICIENT, ZERO, "Rolling friction coefficient; needs a rolling law."),
         key("twisting_friction", COEFFICIENT, ZERO, "Twisting friction coefficient; needs a rolling law."),
+        key(
+            "surface_energy",
+            number(Dimension::SURFACE_ENERGY, Range::NOT_NEGATIVE),
+            ZERO,
+            "Work of adhesion between two surfaces; read by adhesive normal laws.",
+        ),
     ],
 };
 

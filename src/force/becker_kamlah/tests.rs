@@ -138,3 +138,9 @@ fn a_nan_is_not_hidden() {
     law(&[]).evaluate(&table_3(1e-6), &mut memory);
     assert!(law(&[]).evaluate(&table_3(f64::NAN), &mut memory).force.is_nan());
 }
+
+#[test]
+fn particles_beyond_the_fitted_range_are_warned_of() {
+    assert_eq!(caution(2.0), None);
+    assert!(caution(2.5).unwrap().contains("2.5"));
+}

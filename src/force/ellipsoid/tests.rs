@@ -3,6 +3,7 @@
 
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, MAX_ITERATIONS};
+use super::touch::{self, Shapes, Surroundings};
 use super::*;
 use crate::contact::shift::{ShiftTable, encode};
 use crate::force::geometry::{self, Bodies, CellMotion};
@@ -55,6 +56,7 @@ fn smallest(axes: [f64; 3]) -> f64 {
 /// o(n) without any tensor: support functions in body axes.
 struct Slow {
     axes: [[f64; 3]; 2],
+    turns: [[f64; 4]; 2],
     /// Rows are body axes in space.
     frames: [[[f64; 3]; 3]; 2],
     branch: [f64; 3],
@@ -156,7 +158,7 @@ fn random_pair(random: &mut Random) -> (Ellipsoids<f64>, Slow) {
     let overlap = share * smallest(axes[0]).min(smallest(axes[1]));
     let branch = sub(add(points[0], points[1]), scale(normal, overlap));
     let frames = turns.map(|q| [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| turn(q, e)));
-    (Ellipsoids { tensors, branch }, Slow { axes, frames, branch })
+    (Ellipsoids { tensors, branch }, Slow { axes, turns, frames, branch })
 }
 
 #[test]
@@ -265,17 +267,22 @@ fn eight_lanes_give_the_scalar_bits() {
     }
 }
 
-#[test]
-fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
-    let mut random = Random::new(6);
-    let motion = CellMotion {
+/// A cell at rest.
+fn still() -> CellMotion {
+    CellMotion {
         sides: [1.0; 3],
         shift: ShiftTable::new([1.0; 3]),
         faces_move: true,
         shift_velocity: ShiftTable::new([0.0; 3]),
         gradient: [0.0; 3],
         wall_velocity: [0.0; 3],
-    };
+    }
+}
+
+#[test]
+fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
+    let mut random = Random::new(6);
+    let motion = still();
     for _ in 0..2000 {
         let radii = [random.between(0.5e-6, 1e-6), random.between(0.5e-6, 1e-6)];
         let overlap = libm::pow(10.0, random.between(-4.0, -0.7)) * radii[0].min(radii[1]);
@@ -318,4 +325,69 @@ fn curvatures_at_the_vertices_are_those_of_becker_table_3() {
     assert!((1.0 - libm::pow(ellipse.ratio, -4.0 / 3.0) - reference[1]).abs() < 1e-12);
     assert!((ellipse.radius_factor - reference[2]).abs() < 1e-12);
     assert!((ellipse.overlap_factor - reference[3]).abs() < 1e-12);
+}
+
+/// A body that moves on with its velocity and spin.
+struct Moving {
+    semi_axes: [f64; 3],
+    orientation: [f64; 4],
+    position: [f64; 3],
+    velocity: [f64; 3],
+    spin: [f64; 3],
+}
+
+impl Moving {
+    fn at(&self, time: f64) -> (Bodies<f64>, Shapes<f64>) {
+        // A turn about the spin by |ω| t.
+        let rate = dot(self.spin, self.spin).sqrt();
+        let (sine, cosine) = libm::sincos(0.5 * rate * time);
+        let axis = scale(self.spin, sine / rate);
+        let turned = crate::state::shape::product([cosine, axis[0], axis[1], axis[2]], self.orientation);
+        let bodies = Bodies {
+            position: add(self.position, scale(self.velocity, time)),
+            radius: 1.4e-6,
+            velocity: self.velocity,
+            inverse_mass: 1.0,
+            spin: self.spin,
+        };
+        (bodies, Shapes { semi_axes: self.semi_axes, orientation: turned })
+    }
+}
+
+#[test]
+fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodies() {
+    let mut random = Random::new(8);
+    let motion = still();
+    let surroundings = Surroundings { motion: &motion, range: 0.0 };
+    for _ in 0..500 {
+        let (pair, slow) = random_pair(&mut random);
+        let mut body = |position, semi_axes, orientation| Moving {
+            semi_axes,
+            orientation,
+            position,
+            velocity: random.direction(),
+            spin: scale(random.direction(), 1e6),
+        };
+        let bodies = [body([0.0; 3], slow.axes[0], slow.turns[0]), body(pair.branch, slow.axes[1], slow.turns[1])];
+        let at = |time: f64| {
+            let [(a, s), (b, t)] = [bodies[0].at(time), bodies[1].at(time)];
+            touch::ellipsoids(
+                [&a, &b],
+                [&s, &t],
+                pair.common_normal([0.0; 3], 0.0).found.normal,
+                &[encode([0; 3])],
+                &surroundings,
+            )
+        };
+        let (now, h) = (at(0.0).pair, 1e-12);
+        let slope = (at(h).pair.touch.overlap - at(-h).pair.touch.overlap) / (2.0 * h);
+        // Where the motion pulls the bodies apart the search stops at no overlap.
+        if now.touch.overlap > 1e-11 {
+            assert!((now.touch.overlap_rate - slope).abs() < 1e-4, "{} {slope}", now.touch.overlap_rate);
+        }
+        let arms = at(0.0).arms;
+        for k in 0..3 {
+            assert!((arms[0][k] - arms[1][k] - pair.branch[k]).abs() < 1e-20);
+        }
+    }
 }
