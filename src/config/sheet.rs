@@ -250,7 +250,10 @@ fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
         };
         table.row(format!("radius of {}", species.name), text);
         if !species.is_spherical() {
-            table.row(format!("semi-axes of {}", species.name), format!("up to {}", quantity(species.largest_semi_axis(), "m")));
+            table.row(
+                format!("semi-axes of {}", species.name),
+                format!("up to {}", quantity(species.largest_semi_axis(), "m")),
+            );
         }
     }
     let base_sides = config.cell.sides.or_else(|| {

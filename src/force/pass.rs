@@ -47,7 +47,7 @@ pub struct LineRing<'a> {
     /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
     /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
-    /// Number of the first block's first line.
+    /// Number of the first block's first line, a multiple of eight.
     pub first: usize,
     /// Capacity less one, all ones in binary; `usize::MAX` for a buffer that never wraps.
     pub mask: usize,

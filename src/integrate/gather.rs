@@ -4,15 +4,7 @@
 use crate::contact::list::End;
 use crate::force::lane::Lane;
 use crate::force::observe::CONTACT_LEDGER;
-
-/// Force \[N\] and torque \[N m\] on a particle in the first three of four lanes; the fourth means nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load<L> {
-    /// Force.
-    pub force: L,
-    /// Torque about the centre.
-    pub torque: L,
-}
+use crate::force::pass::LEDGER_STRIDE;
 
 /// Output lines of the contact passes as the particles of one strip see them.
 #[derive(Debug, Clone, Copy)]
@@ -23,10 +15,8 @@ pub struct Lines<'a> {
     pub stride: usize,
     /// Lines kept for the step, from number 0 on.
     pub kept: &'a [f64],
-    /// The strip's ring.
+    /// The strip's ring: line `n` at place `n mod capacity`.
     pub ring: &'a [f64],
-    /// Number of the ring's first line.
-    pub first: usize,
     /// Capacity of the ring less one.
     pub mask: usize,
 }
@@ -36,45 +26,60 @@ impl Lines<'_> {
     #[inline(always)]
     fn part<const N: usize>(&self, number: usize, offset: usize) -> &[f64; N] {
         let kept = number * self.stride < self.kept.len();
-        let place = if kept { number } else { (number - self.first) & self.mask };
+        let place = if kept { number } else { number & self.mask };
         let values = if kept { self.kept } else { self.ring };
         let start = place * self.stride + offset;
         values[start..start + N].try_into().expect("a slice of N numbers")
     }
 
-    /// Sum over the contacts of one particle, given its ends, in lanes four wide.
+    /// Sums over the contacts of consecutive particles, in lanes four wide: force \[N\], torque about the centre
+    /// \[N m\], the fourth number of each without meaning. `ends[offsets[p]..offsets[p + 1]]` are those of
+    /// particle `p`.
     #[inline(always)]
-    #[must_use]
-    pub fn load<L: Lane>(&self, ends: &[End]) -> Load<L> {
-        match self.width {
-            4 => self.sum::<L, 4>(ends),
-            8 => self.sum::<L, 8>(ends),
-            12 => self.sum::<L, 12>(ends),
-            _ => self.sum::<L, 16>(ends),
+    pub fn sum_all<L: Lane>(&self, offsets: &[u32], ends: &[End], loads: &mut [[f64; 8]]) {
+        match (self.width, self.stride) {
+            (4, 4) => self.sums::<L, 4, 4>(offsets, ends, loads),
+            (8, 8) => self.sums::<L, 8, 8>(offsets, ends, loads),
+            (12, 12) => self.sums::<L, 12, 12>(offsets, ends, loads),
+            (16, 16) => self.sums::<L, 16, 16>(offsets, ends, loads),
+            (4, _) => self.sums::<L, 4, { 4 + LEDGER_STRIDE }>(offsets, ends, loads),
+            (8, _) => self.sums::<L, 8, { 8 + LEDGER_STRIDE }>(offsets, ends, loads),
+            (12, _) => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(offsets, ends, loads),
+            _ => self.sums::<L, 16, { 16 + LEDGER_STRIDE }>(offsets, ends, loads),
         }
     }
 
     #[inline(always)]
-    fn sum<L: Lane, const WIDTH: usize>(&self, ends: &[End]) -> Load<L> {
+    fn sums<L: Lane, const WIDTH: usize, const STRIDE: usize>(
+        &self,
+        offsets: &[u32],
+        ends: &[End],
+        loads: &mut [[f64; 8]],
+    ) {
         const SIGN: [f64; 2] = [1.0, -1.0];
-        let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
-        for end in ends {
-            let line = self.part::<WIDTH>(end.line(), 0);
-            let sign = L::splat(SIGN[usize::from(end.is_second())]);
-            force = force + sign * L::load(&line[..4]);
-            if WIDTH == 16 {
-                torque = torque + L::load(&line[4 + 4 * usize::from(end.is_second())..][..4]);
-                continue;
+        let (kept, ring) = (self.kept.as_chunks::<STRIDE>().0, self.ring.as_chunks::<STRIDE>().0);
+        for (bounds, load) in offsets.windows(2).zip(loads) {
+            let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
+            for end in &ends[bounds[0] as usize..bounds[1] as usize] {
+                let number = end.line();
+                let line = if number < kept.len() { &kept[number] } else { &ring[number & self.mask] };
+                let second = usize::from(end.is_second());
+                let sign = L::splat(SIGN[second]);
+                force = force + sign * L::load(&line[..4]);
+                if WIDTH == 16 {
+                    torque = torque + L::load(&line[4 + 4 * second..][..4]);
+                    continue;
+                }
+                if WIDTH >= 8 {
+                    torque = torque + L::splat(line[3 + 4 * second]) * L::load(&line[4..8]);
+                }
+                if WIDTH >= 12 {
+                    torque = torque + sign * L::load(&line[8..12]);
+                }
             }
-            if WIDTH >= 8 {
-                let arm = line[3 + 4 * usize::from(end.is_second())];
-                torque = torque + L::splat(arm) * L::load(&line[4..8]);
-            }
-            if WIDTH >= 12 {
-                torque = torque + sign * L::load(&line[8..12]);
-            }
+            force.store(&mut load[..4]);
+            torque.store(&mut load[4..]);
         }
-        Load { force, torque }
     }
 
     /// Add what the contacts of which this particle has the lower id put into its ledger.

@@ -3,9 +3,9 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
-use super::gather::{Lines, Load};
+use super::gather::Lines;
 use super::rotation::Rotation;
-use crate::contact::list::End;
+use crate::contact::list::{CHUNK, End};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::avx2::F64x4;
 use crate::force::lane::portable::Portable;
@@ -58,6 +58,16 @@ pub struct StepResult {
 }
 
 impl StepResult {
+    /// A squared displacement above all before, or one that is not a number.
+    #[cold]
+    fn take_displacement(&mut self, squared: f64, particle: u32) {
+        if squared.is_nan() {
+            self.lost = Some(particle);
+        } else {
+            self.max_displacement_squared = squared;
+        }
+    }
+
     /// Join with what other particles brought.
     pub fn absorb(&mut self, mut other: Self) {
         if other.max_displacement_squared > self.max_displacement_squared {
@@ -82,7 +92,7 @@ pub struct Slice<'a> {
     /// Their shapes; empty when every particle of all ranks is a sphere.
     pub shape: &'a mut [Shape],
     ledger: &'a mut [[f64; LEDGER.len()]],
-    reference: &'a [[f64; 4]],
+    reference: &'a mut [[f64; 4]],
     crossed: &'a mut [[i8; 4]],
 }
 
@@ -99,7 +109,7 @@ impl<'a> Slice<'a> {
             orientation: &mut particles.orientation,
             shape: if particles.ellipsoids { &mut particles.shape[..owned] } else { &mut [] },
             ledger: &mut particles.ledger,
-            reference: &reference.position,
+            reference: &mut reference.position,
             crossed: &mut reference.crossed[..owned],
         }
     }
@@ -114,7 +124,7 @@ impl<'a> Slice<'a> {
         let (orientation, orientation_high) = self.orientation.split_at_mut(count.min(self.orientation.len()));
         let (shape, shape_high) = self.shape.split_at_mut(count.min(self.shape.len()));
         let (ledger, ledger_high) = self.ledger.split_at_mut(count.min(self.ledger.len()));
-        let (reference, reference_high) = self.reference.split_at(count);
+        let (reference, reference_high) = self.reference.split_at_mut(count);
         let (crossed, crossed_high) = self.crossed.split_at_mut(count);
         let low =
             Self { start: self.start, record, image, velocity, spin, orientation, shape, ledger, reference, crossed };
@@ -137,7 +147,7 @@ impl<'a> Slice<'a> {
 /// Positions at the last list rebuild and the images crossed since the last Verlet list.
 #[derive(Debug, Clone, Default)]
 pub struct Reference {
-    /// Positions then, unwrapped back to the last Verlet list \[m\]; the fourth number is 0.
+    /// Positions then, seen from the image in which the particle is now \[m\]; the fourth number is 0.
     pub position: Vec<[f64; 4]>,
     /// Images crossed since the last Verlet list, of owned particles and ghosts; the fourth is 0.
     pub crossed: Vec<[i8; 4]>,
@@ -151,12 +161,9 @@ impl Reference {
     }
 
     /// Take the present positions of the owned particles.
-    pub fn take(&mut self, particles: &Particles, sides: [f64; 3]) {
-        let now = particles.record[..particles.owned].iter().zip(&self.crossed);
+    pub fn take(&mut self, particles: &Particles) {
         self.position.clear();
-        self.position.extend(
-            now.map(|(r, crossed)| padded([0, 1, 2].map(|k| r.position[k] + f64::from(crossed[k]) * sides[k]))),
-        );
+        self.position.extend(particles.record[..particles.owned].iter().map(|record| padded(record.position)));
     }
 
     /// A particle crossed periodic faces.
@@ -211,53 +218,53 @@ fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
     advance_range::<F64x4>(slice, batch, result);
 }
 
-/// The motion, a particle at a time in lanes (x, y, z, not used). The position shares its lanes with the
-/// radius, which the constants of the fourth lane leave as it is.
+/// Sums first, then the motion, a particle at a time in lanes (x, y, z, not used). A position shares its lanes
+/// with the radius, velocity and spin with 1/m and 1/I; constants that are 0 or 1 in the fourth lane leave them.
 #[inline(always)]
 fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
     let Batch { range, offsets, ends, lines, motion } = batch;
     const { assert!(L::WIDTH == 4) };
+    let mut loads = [[0.0; 2 * 4]; CHUNK];
+    let offsets = &offsets[slice.start + range.start..=slice.start + range.end];
+    lines.sum_all::<L>(offsets, ends, &mut loads);
+    if motion.ledger {
+        for (index, load) in range.clone().zip(&loads) {
+            let place = index - range.start;
+            let ends = &ends[offsets[place] as usize..offsets[place + 1] as usize];
+            lines.add_ledger(ends, &mut slice.ledger[index]);
+            add_external_work(&mut slice.ledger[index], &slice.record[index], load, motion);
+        }
+    }
     let zero = L::splat(0.0);
     let three = |v: [f64; 3], fourth: f64| L::load(&[v[0], v[1], v[2], fourth]);
     let vector = three([1.0; 3], 0.0).greater(zero);
     let (old, new) = (motion.previous_time_step, motion.time_step);
-    let (kick, half) = (L::splat(0.5 * (old + new)), L::splat(0.5 * new));
+    let (kick, half) = (three([0.5 * (old + new); 3], 0.0), three([0.5 * new; 3], 0.0));
     let drift = three([0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new), 0.0);
     let scale = three(motion.scale, 1.0);
     let gravity = three(motion.gravity, 0.0);
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
-    for index in range {
-        let particle = slice.start + index;
-        let ends = &ends[offsets[particle] as usize..offsets[particle + 1] as usize];
-        let load = lines.load::<L>(ends);
-        let inverse_mass = L::splat(slice.record[index].inverse_mass);
-        let free = inverse_mass.greater(zero);
-        if motion.ledger {
-            lines.add_ledger(ends, &mut slice.ledger[index]);
-            add_external_work(&mut slice.ledger[index], &slice.record[index], &load, motion);
-        }
+    for (index, load) in range.zip(&loads) {
+        let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
-        let pull = L::select(free, gravity, zero);
-        let acceleration = L::select(vector, load.force * inverse_mass, zero) + pull;
+        let inverse_mass = L::splat(record[7]);
+        let pull = L::select(inverse_mass.greater(zero), gravity, zero);
+        let acceleration = force * inverse_mass + pull;
         let mut velocity = L::load(&slice.velocity[index]) + kick * acceleration;
         let mut position = scale * L::load(&record[..4]) + drift * velocity;
         if motion.rotation && slice.shape.is_empty() {
-            let angular = L::select(vector, load.torque * L::splat(record[11]), zero);
+            let angular = torque * L::splat(record[11]);
             let spin = L::load(&slice.spin[index]) + kick * angular;
             spin.store(&mut slice.spin[index]);
-            let mut full = [0.0; 4];
-            (spin + half * angular).store(&mut full);
-            record[8..11].copy_from_slice(&full[..3]);
+            L::select(vector, spin + half * angular, L::load(&record[8..])).store(&mut record[8..]);
             if motion.orientation {
                 slice.orientation[index] = turned(slice.orientation[index], trimmed(slice.spin[index]), new);
             }
         }
         position.store(&mut record[..4]);
         if !slice.shape.is_empty() {
-            let mut torque = [0.0; 4];
-            load.torque.store(&mut torque);
-            turn(slice, index, trimmed(torque), motion);
+            turn(slice, index, [load[4], load[5], load[6]], motion);
         }
         if L::any(zero.greater(position) | position.at_least(sides)) {
             velocity.store(&mut slice.velocity[index]);
@@ -266,21 +273,15 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
             position = L::load(&bytemuck::cast_ref::<_, [f64; RECORD]>(&slice.record[index])[..4]);
         }
         velocity.store(&mut slice.velocity[index]);
-        let mut full = [0.0; 4];
-        (velocity + half * acceleration).store(&mut full);
-        slice.record[index].velocity = trimmed(full);
-        let [x, y, z, _] = slice.crossed[index];
-        let crossed = three([x, y, z].map(f64::from), 0.0);
-        let unwrapped = position + L::select(vector, crossed * sides, zero);
-        let moved = L::select(vector, unwrapped - stretch * L::load(&slice.reference[index]), zero);
+        let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
+        L::select(vector, velocity + half * acceleration, L::load(&record[4..8])).store(&mut record[4..8]);
+        let moved = position - stretch * L::load(&slice.reference[index]);
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
         let squared = squares[0] + squares[1] + squares[2];
-        if squared > result.max_displacement_squared {
-            result.max_displacement_squared = squared;
-        }
-        if squared.is_nan() {
-            result.lost = Some(particle as u32);
+        // Written so that NaN comes through.
+        if !(squared <= result.max_displacement_squared) {
+            result.take_displacement(squared, (slice.start + index) as u32);
         }
     }
 }
@@ -326,6 +327,9 @@ fn wrap(slice: &mut Slice, index: usize, motion: &StepMotion, result: &mut StepR
         for k in 0..3 {
             slice.image[index][k] += wraps[k];
         }
+        for k in 0..3 {
+            slice.reference[index][k] -= f64::from(wraps[k]) * motion.reference_sides[k];
+        }
         cross(&mut slice.crossed[index], wraps);
         result.wrapped.push(((slice.start + index) as u32, wraps));
     }
@@ -353,15 +357,13 @@ pub fn wrapped(x: f64, side: f64) -> (f64, i32) {
 
 /// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
 #[inline(always)]
-fn add_external_work<L: Lane>(ledger: &mut [f64; LEDGER.len()], record: &Record, load: &Load<L>, motion: &StepMotion) {
+fn add_external_work(ledger: &mut [f64; LEDGER.len()], record: &Record, load: &[f64; 8], motion: &StepMotion) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     if record.inverse_mass > 0.0 {
         ledger[1] += dot(motion.gravity, record.velocity) / record.inverse_mass * motion.time_step;
     } else {
-        let (mut force, mut torque) = ([0.0; 4], [0.0; 4]);
-        load.force.store(&mut force);
-        load.torque.store(&mut torque);
-        ledger[2] -= (dot(trimmed(force), record.velocity) + dot(trimmed(torque), record.spin)) * motion.time_step;
+        let (force, torque) = ([load[0], load[1], load[2]], [load[4], load[5], load[6]]);
+        ledger[2] -= (dot(force, record.velocity) + dot(torque, record.spin)) * motion.time_step;
     }
 }
 

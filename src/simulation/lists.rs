@@ -150,6 +150,6 @@ impl Simulation {
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
         self.lines.fit(&self.contacts);
-        self.reference.take(&self.particles, sides);
+        self.reference.take(&self.particles);
     }
 }

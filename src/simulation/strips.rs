@@ -200,19 +200,12 @@ impl Phase<'_> {
         for chunk in 0..strip.chunks() {
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
-                let lines = LineRing { values: &mut *ring, first: run.line as usize - strip.first_line, mask };
+                let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
                 let bodies = BodyData { records: slice.record, shapes: slice.shape };
                 let found = self.evaluate(run, work.first_section, work.sections, bodies, lines);
                 fault = fault.or(found);
             }
-            let lines = Lines {
-                width: view.width,
-                stride: self.input.stride,
-                kept: view.kept,
-                ring: &*ring,
-                first: strip.first_line,
-                mask,
-            };
+            let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
             let batch = Batch { range, offsets: view.offsets, ends: view.ends, lines, motion };
             leap_frog::advance(&mut slice, batch, &mut result);
