@@ -203,8 +203,8 @@ impl System {
             self.stretch(stretch);
         }
         for (index, position) in self.positions.iter_mut().enumerate() {
-            for k in 0..3 {
-                position[k] += step * motion.on_position[index][k];
+            for (x, speed) in position.iter_mut().zip(motion.on_position[index]) {
+                *x += step * speed;
             }
             let half = 0.5 * step / self.arms[index];
             let [x, y, z] = motion.on_turn[index].map(|path| half * path);

@@ -109,10 +109,10 @@ pub fn regimes(output: &Path) -> Result<Figure> {
         x: [0.0, 102.0 * highest],
         y: [0.0, 1.05 * top],
         legend: Corner::UpperLeft,
-        series: vec![Series::new("2000 NMC ellipsoids", Ink::Blue, Style::Solid, stress)],
+        series: vec![Series::new("1000 NMC ellipsoids", Ink::Blue, Style::Solid, stress)],
     };
     Ok(Figure {
-        title: "An assembly of 2000 ellipsoids: contacts by regime",
+        title: "An assembly of 1000 ellipsoids: contacts by regime",
         checks,
         panels: vec![("assembly_regimes", shares), ("assembly_stress", stress)],
     })

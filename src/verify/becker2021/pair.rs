@@ -287,7 +287,9 @@ pub fn without_transition(output: &Path) -> Result<Figure> {
         1.02 * points.iter().map(|point| point.0).fold(0.0, f64::max) / theory.yield_overlap,
         1.05 * points.iter().map(|point| point.1).fold(0.0, f64::max) / theory.yield_force,
     ];
-    let line: Points = first_loading(&points).iter().map(|&(x, _)| (x, theory.loading(x))).collect();
+    let deepest = points.iter().map(|point| point.0).fold(0.0, f64::max);
+    let grid = (0..=200).map(|k| deepest * f64::from(k) / 200.0);
+    let line: Points = grid.map(|x| (x, theory.loading(x))).collect();
     let force = panel(
         "Two load cycles, 1 : 1 : 0.8 and 1 : 1.25 : 1.25",
         ends,
