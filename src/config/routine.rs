@@ -45,6 +45,8 @@ pub struct QuasiStaticConfig {
     pub max_blocks: u64,
     /// What removes the kinetic energy.
     pub damping: Damping,
+    /// Restitution coefficient of the contact laws' dashpots in quasi-static stages.
+    pub restitution: f64,
     /// Factor β of the pseudo time step.
     pub safety: f64,
     /// Largest mean unbalanced force over mean contact force at equilibrium.
@@ -84,13 +86,14 @@ pub(super) fn read(root: &Section) -> Option<QuasiStaticConfig> {
         Some(Chosen::Table(..)) => Some(Damping::Contact),
         _ => None,
     };
-    let safety = section.number("safety");
+    let (restitution, safety) = (section.number("restitution"), section.number("safety"));
     let thresholds = ["max_unbalanced_ratio", "max_kinetic_ratio", "max_displacement_ratio", "touching_overlap"];
     let [unbalanced, kinetic, displacement, touching] = thresholds.map(|name| section.number(name));
     Some(QuasiStaticConfig {
         substeps: substeps?,
         max_blocks: max_blocks?,
         damping: damping?,
+        restitution: restitution?,
         safety: safety?,
         max_unbalanced_ratio: unbalanced?,
         max_kinetic_ratio: kinetic?,
@@ -179,7 +182,8 @@ pub(super) fn check(root: &Section, stages: &[Stage], species: Option<&[Species]
         let message = "there is no energy balance in quasi-static stages: artificial damping removes what does not fit";
         output.problem("energy_ledger", message, "remove it, or make every stage dynamic");
     }
-    let moves = |motion: &Motion| matches!(motion, Motion::Driven { velocity, spin } if [velocity, spin] != [&[0.0; 3]; 2]);
+    let moves =
+        |motion: &Motion| matches!(motion, Motion::Driven { velocity, spin } if [velocity, spin] != [&[0.0; 3]; 2]);
     for species in species.unwrap_or(&[]).iter().filter(|species| moves(&species.motion)) {
         let message = format!(
             "\"{}\" is driven, and a velocity has no meaning in quasi-static stages, where time does not pass",
