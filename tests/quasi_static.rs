@@ -58,8 +58,8 @@ fn hertz(a: (f64, f64), b: (f64, f64)) -> f64 {
 
 /// Force in a column of spheres with these contact coefficients that is shortened by `way`.
 fn column_force(coefficients: &[f64], way: f64) -> f64 {
-    let compliance: f64 = coefficients.iter().map(|c| c.powf(-2.0 / 3.0)).sum();
-    (way / compliance).powf(1.5)
+    let compliance: f64 = coefficients.iter().map(|c| libm::pow(*c, -2.0 / 3.0)).sum();
+    libm::pow(way / compliance, 1.5)
 }
 
 /// Force in the column, from the stress on its cross-section.
