@@ -325,11 +325,12 @@ pub(super) fn unit_of(kind: &Kind) -> String {
 
 fn parse_interval(text: &str) -> Result<Interval, String> {
     let trimmed = text.trim();
-    let counts: [(&str, fn(u64) -> Interval); 2] = [("step", Interval::Steps), ("increment", Interval::Increments)];
-    for (word, interval) in counts {
+    for word in ["step", "increment"] {
         if let Some(count) = trimmed.trim_end_matches('s').strip_suffix(word) {
             return match count.trim().parse::<u64>() {
-                Ok(count) if count > 0 => Ok(interval(count)),
+                Ok(count) if count > 0 => {
+                    Ok(if word == "step" { Interval::Steps(count) } else { Interval::Increments(count) })
+                }
                 _ => Err(format!("`{}` is not a whole number of {word}s greater than 0", count.trim())),
             };
         }

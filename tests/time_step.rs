@@ -1,0 +1,36 @@
+//! The automatic time step follows the contacts as they stiffen, W (2.8).
+
+mod common;
+
+use common::{Run, launch, root, scratch, text};
+use dem_mpi::config::load;
+use dem_mpi::output::history;
+
+#[test]
+fn the_automatic_time_step_shrinks_with_the_stiffness_of_the_deepest_contact() {
+    let config = root().join("configs/two_spheres.toml");
+    let folder = scratch("stiffening");
+    // A row per control step, so that each shows the step chosen at its overlap.
+    let extra = ["--set", "output.history=50 steps", "--set", "output.plots=false", "--set", "stage.1.duration=1 ms"];
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &folder, &extra);
+    assert!(output.status.success(), "{}", text(&output));
+    let input = load(&config, &[], None, None).unwrap();
+    let material = &input.materials[0];
+    let modulus = material.young_modulus + material.maxwell.iter().map(|branch| branch.modulus).sum::<f64>();
+    let effective = 0.5 * modulus / (1.0 - material.poisson_ratio * material.poisson_ratio);
+    let radius = input.species[0].radius.max();
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * radius * radius * radius;
+    let mass = volume * material.density * material.density_scaling;
+    let rows = history::read(&folder).unwrap();
+    // Below the reference overlap of 1e-3 R the floor holds.
+    let stiffening: Vec<_> =
+        rows.iter().filter(|row| row.step.is_multiple_of(50) && row.max_overlap_ratio > 1e-3).collect();
+    assert!(stiffening.len() > 20, "{}", stiffening.len());
+    for row in &stiffening {
+        let stiffness = 2.0 * effective * (0.5 * radius * row.max_overlap_ratio * radius).sqrt();
+        let expected = 0.17 * (mass / stiffness).sqrt();
+        assert!((row.time_step / expected - 1.0).abs() < 1e-9, "step {}: {:e}, {expected:e}", row.step, row.time_step);
+    }
+    let [first, .., last] = &stiffening[..] else { unreachable!("more than twenty") };
+    assert!(last.time_step < 0.6 * first.time_step, "{:e} after {:e}", last.time_step, first.time_step);
+}
