@@ -124,7 +124,6 @@ fn main() {
     let motion = CellMotion {
         sides: [10.0; 3],
         shift: ShiftTable::new([10.0; 3]),
-        faces_move: true,
         shift_velocity: ShiftTable::new([0.0; 3]),
         gradient: [0.0; 3],
         wall_velocity: [0.0; 3],

@@ -5,6 +5,7 @@ pub mod becker2021;
 mod collision;
 mod conservation;
 mod ellipsoids;
+mod hereditary;
 mod oblique;
 mod plastic;
 mod scene;
@@ -106,6 +107,7 @@ const CASES: &[Case] = &[
     Case { name: "Becker-Kamlah force along a path of overlaps (B Table 3)", run: ellipsoids::path },
     Case { name: "off-centre impact of two ellipsoids", run: ellipsoids::conservation },
     Case { name: "spheres treated as ellipsoids", run: ellipsoids::spheres },
+    Case { name: "generalised Maxwell: hereditary integral, several branches", run: hereditary::branches },
     Case { name: "sliding block and rolling sphere", run: sliding::to_rest },
     Case { name: "momentum and energy of a periodic gas", run: conservation::gas },
     Case { name: "order of the integrator", run: conservation::order },

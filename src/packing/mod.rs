@@ -1,6 +1,7 @@
 //! Initial state: sizes, positions and velocities of all particles, by id. Made by one process, serially
 //! and from counter-based random numbers; knows nothing of ranks.
 
+pub mod drop_and_roll;
 pub mod ellipsoids;
 pub mod file;
 pub mod grid;
@@ -8,6 +9,7 @@ pub mod overlap;
 pub mod radii;
 pub mod random;
 pub mod rcp;
+pub mod relax;
 pub mod relaxation;
 pub mod replicate;
 pub mod tournament;
@@ -45,6 +47,7 @@ pub fn build(config: &Config) -> Result<Packing> {
             random_close(config, *contraction_rate, *max_moves_per_particle)?
         }
         PackingConfig::Relaxation { tolerance, max_steps } => relaxed(config, *tolerance, *max_steps)?,
+        PackingConfig::DropAndRoll(settings) => drop_and_roll::input::build(config, settings)?,
         PackingConfig::File { path } => from_file(config, path)?,
     };
     if packing.particles.is_empty() {

@@ -20,6 +20,8 @@ pub enum Purpose {
     Shape = 5,
     /// Initial orientations.
     Orientation = 6,
+    /// The order in which spheres are dropped.
+    DropOrder = 7,
 }
 
 /// The sequence of random numbers of one particle for one purpose.
