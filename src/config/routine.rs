@@ -179,7 +179,8 @@ pub(super) fn check(root: &Section, stages: &[Stage], species: Option<&[Species]
         let message = "there is no energy balance in quasi-static stages: artificial damping removes what does not fit";
         output.problem("energy_ledger", message, "remove it, or make every stage dynamic");
     }
-    let moves = |motion: &Motion| matches!(motion, Motion::Driven { velocity, spin } if [velocity, spin] != [&[0.0; 3]; 2]);
+    let moves =
+        |motion: &Motion| matches!(motion, Motion::Driven { velocity, spin } if [velocity, spin] != [&[0.0; 3]; 2]);
     for species in species.unwrap_or(&[]).iter().filter(|species| moves(&species.motion)) {
         let message = format!(
             "\"{}\" is driven, and a velocity has no meaning in quasi-static stages, where time does not pass",

@@ -181,7 +181,8 @@ impl Kind {
             Self::Flag => "true or false".to_owned(),
             Self::Choice(words) => quoted(words),
             Self::Interval => {
-                "a time such as \"0.1 s\" or a count such as \"1000 steps\" or \"10 increments\", greater than 0".to_owned()
+                "a time such as \"0.1 s\" or a count such as \"1000 steps\" or \"10 increments\", greater than 0"
+                    .to_owned()
             }
             Self::Table(_) => "a section".to_owned(),
             Self::List(_) => "sections in double brackets, [[…]]".to_owned(),

@@ -1,8 +1,8 @@
 //! Reads the load programme and checks that every stage can end.
 
 use super::programme::{Progress, advance};
-use super::section::Section;
 use super::routine::{self, Routine};
+use super::section::Section;
 use super::{AxisControl, Boundary, CellConfig, Kinematics, Stage};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -199,10 +199,8 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
         stages.push(None);
         return;
     };
-    let only_strain = stage.duration.is_none()
-        && stage.steps.is_none()
-        && stage.increments.is_none()
-        && stage.until_stress.is_none();
+    let only_strain =
+        stage.duration.is_none() && stage.steps.is_none() && stage.increments.is_none() && stage.until_stress.is_none();
     if let (Some((axis, target)), true) = (stage.until_strain, only_strain)
         && let AxisControl::StrainRate(rate) = stage.axes[axis]
     {
@@ -210,7 +208,9 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
         if rate == 0.0 || start.is_some_and(|start| (target - start) * rate <= 0.0) {
             let start = start.map_or_else(String::new, |start| format!(" from strain {start}"));
             let (what, other) = match stage.routine {
-                Routine::Dynamic => (format!("at strain rate {rate} 1/s"), "the strain rate's sign, or end by duration"),
+                Routine::Dynamic => {
+                    (format!("at strain rate {rate} 1/s"), "the strain rate's sign, or end by duration")
+                }
                 Routine::QuasiStatic => {
                     (format!("in increments of {rate}"), "the increment's sign, or end by increments")
                 }

@@ -133,7 +133,8 @@ impl Simulation {
         }
         Err(Error::Simulation {
             step: self.global.step,
-            message: "no particle is free to move, so there is no equilibrium to look for; use the dynamic routine".into(),
+            message: "no particle is free to move, so there is no equilibrium to look for; use the dynamic routine"
+                .into(),
         })
     }
 

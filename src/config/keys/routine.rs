@@ -8,7 +8,12 @@ pub static QUASI_STATIC: Table = Table {
     meaning: "The quasi-static routine: after each strain increment blocks of substeps with artificial damping, until \
               force, kinetic energy and displacement are below their thresholds. See docs/quasi_static.md.",
     keys: &[
-        key("substeps", Kind::Integer(2), Default::Integer(50), "Substeps per block; equilibrium is tested after each."),
+        key(
+            "substeps",
+            Kind::Integer(2),
+            Default::Integer(50),
+            "Substeps per block; equilibrium is tested after each.",
+        ),
         key(
             "max_blocks",
             Kind::Integer(1),
@@ -51,7 +56,12 @@ const fn threshold(name: &'static str, default: f64, meaning: &'static str) -> K
 static DAMPING: Table = Table {
     meaning: "Artificial damping of the substeps.",
     keys: &[
-        key("fire", Kind::Table(&FIRE), Absent, "All velocities turn towards the forces, and stop when they go uphill."),
+        key(
+            "fire",
+            Kind::Table(&FIRE),
+            Absent,
+            "All velocities turn towards the forces, and stop when they go uphill.",
+        ),
         key("local", Kind::Table(&LOCAL), Absent, "Against each velocity a share of the force (Cundall's)."),
         key("viscous", Kind::Table(&VISCOUS), Absent, "Proportional to mass and velocity (dynamic relaxation)."),
         key("contact", Kind::Table(&CONTACT), Absent, "None beside the dashpots of the contact laws (W Sec. 3.1)."),
@@ -60,38 +70,32 @@ static DAMPING: Table = Table {
 
 static FIRE: Table = Table {
     meaning: "Fast inertial relaxation: v ← (1−α) v + α |v| F/|F| while the power F·v is positive, else v = 0.",
-    keys: &[
-        key(
-            "mixing",
-            number(Dimension::NONE, Range::FRACTION),
-            Default::Number(0.1),
-            "α after a stop; it shrinks by 1 % per substep from the fifth on.",
-        ),
-    ],
+    keys: &[key(
+        "mixing",
+        number(Dimension::NONE, Range::FRACTION),
+        Default::Number(0.1),
+        "α after a stop; it shrinks by 1 % per substep from the fifth on.",
+    )],
 };
 
 static LOCAL: Table = Table {
     meaning: "Local non-viscous damping: a force −coefficient·|F|·sign(v) on each component.",
-    keys: &[
-        key(
-            "coefficient",
-            number(Dimension::NONE, Range::between(0.0, 1.0)),
-            Default::Number(0.7),
-            "Share of the unbalanced force.",
-        ),
-    ],
+    keys: &[key(
+        "coefficient",
+        number(Dimension::NONE, Range::between(0.0, 1.0)),
+        Default::Number(0.7),
+        "Share of the unbalanced force.",
+    )],
 };
 
 static VISCOUS: Table = Table {
     meaning: "Dynamic relaxation: every velocity loses the same share in each substep.",
-    keys: &[
-        key(
-            "share",
-            number(Dimension::NONE, Range::between(0.0, 1.0)),
-            Default::Number(0.05),
-            "Share of the velocity that a substep takes away.",
-        ),
-    ],
+    keys: &[key(
+        "share",
+        number(Dimension::NONE, Range::between(0.0, 1.0)),
+        Default::Number(0.05),
+        "Share of the velocity that a substep takes away.",
+    )],
 };
 
 static CONTACT: Table = Table { meaning: "Dashpots of the contact laws only.", keys: &[] };

@@ -18,7 +18,10 @@ pub(super) fn rows(table: &mut Table, config: &Config, estimate: &Estimate) {
     let known = if stages(config).any(|stage| stage.until_stress.is_some()) { " at most or unknown" } else { "" };
     table.row(
         "quasi-static increments",
-        format!("{:.0}{known}, tested for equilibrium every {} substeps", estimate.progress.increments, settings.substeps),
+        format!(
+            "{:.0}{known}, tested for equilibrium every {} substeps",
+            estimate.progress.increments, settings.substeps
+        ),
     );
     let damping = match settings.damping {
         Damping::Fire { mixing } => format!("fire (mixing {mixing})"),
@@ -33,7 +36,8 @@ pub(super) fn rows(table: &mut Table, config: &Config, estimate: &Estimate) {
     });
     table.row("largest strain increment", format!("{largest:.1e}"));
     if let Some((step, pair)) = automatic_step(config, settings.safety, estimate.overlap.max(2.0 * largest)) {
-        let text = format!("{} at the expected overlap, limited by {pair}; it has no physical meaning", quantity(step, "s"));
+        let text =
+            format!("{} at the expected overlap, limited by {pair}; it has no physical meaning", quantity(step, "s"));
         table.row("pseudo time step", text);
     }
     for material in config.materials.iter().filter(|material| !material.maxwell.is_empty()) {

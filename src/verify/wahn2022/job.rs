@@ -83,6 +83,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("wahn2022/fig09.toml", include_str!("../../../configs/wahn2022/fig09.toml")),
     ("wahn2022/fig10.toml", include_str!("../../../configs/wahn2022/fig10.toml")),
     ("wahn2022/fig12.toml", include_str!("../../../configs/wahn2022/fig12.toml")),
+    ("wahn2022/fig13.toml", include_str!("../../../configs/wahn2022/fig13.toml")),
     ("wahn2022/fig14.toml", include_str!("../../../configs/wahn2022/fig14.toml")),
     ("wahn2022/fig15.toml", include_str!("../../../configs/wahn2022/fig15.toml")),
     ("wahn2022/fig16.toml", include_str!("../../../configs/wahn2022/fig16.toml")),
