@@ -2,7 +2,7 @@
 
 mod overlap;
 
-use crate::config::{Boundary, Config, Motion, ParallelConfig, Replication, TimeStepConfig};
+use crate::config::{Boundary, Config, Motion, PackingConfig, ParallelConfig, Replication, TimeStepConfig};
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
 use crate::exchange::{
@@ -259,11 +259,11 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
 pub struct SetupReport {
     /// Bringing particles and contact memory to their owners \[s\].
     pub distribution: f64,
-    /// Checking a packing that was made in parallel for overlaps \[s\].
+    /// Looking for overlaps in a packing that was made in parallel or relaxed \[s\].
     pub check: f64,
     /// First migration, halo, neighbour and contact lists \[s\].
     pub lists: f64,
-    /// The largest overlap of a packing that was made in parallel, if anything overlaps.
+    /// The largest overlap of a packing that was made in parallel or relaxed, if anything overlaps.
     pub overlap: Option<Worst>,
 }
 
@@ -312,7 +312,8 @@ pub fn timed_simulation(
     initial.particles = Vec::new();
     initial.memory = ContactMemory::new(0);
     report.distribution = started.elapsed().as_secs_f64();
-    if config.replication != Replication::NONE && initial.global.step == 0 {
+    let relaxed = matches!(config.packing, PackingConfig::DropAndRoll(_));
+    if (relaxed || config.replication != Replication::NONE) && initial.global.step == 0 {
         let started = Instant::now();
         let space = overlap::Space { decomposition: &decomposition, sides: initial.global.sides, config };
         report.overlap = overlap::largest(&comm, &space, &mut particles, model.max_radius)?;

@@ -68,7 +68,7 @@ pub static ROOT: Table = Table {
 /// `[cell]`.
 pub static CELL: Table = Table {
     meaning: "A box with its low corner at the origin. Give `sides`, or `solid_fraction`, or neither \
-              (random close packing then sizes the box by where it jams).",
+              (random close packing then sizes the box by where it jams, drop and roll by the height of the bed).",
     keys: &[
         key(
             "sides",
@@ -155,6 +155,7 @@ pub static PACKING: Table = Table {
     meaning: "How the initial positions are made.",
     keys: &[
         key("random_close", Kind::Table(&RANDOM_CLOSE), Absent, "Jodrey-Tory random close packing."),
+        key("drop_and_roll", Kind::Table(&DROP_AND_ROLL), Absent, "Spheres dropped one after the other."),
         key("file", Kind::Table(&FILE), Absent, "Particles from a file."),
     ],
 };
@@ -187,6 +188,30 @@ static RANDOM_CLOSE: Table = Table {
             number(Dimension::NONE, Range::POSITIVE),
             Default::Number(1e5),
             "Give up after this many moves per particle.",
+        ),
+        REPLICATE,
+        PERTURBATION,
+    ],
+};
+
+static DROP_AND_ROLL: Table = Table {
+    meaning: "Spheres fall one after the other and roll down to where three others, or the floor, hold them; solid \
+              fraction about 0.58. Periodic in x and y. With a periodic z axis, floor and surface are cut off, and the \
+              overlaps at the cut relaxed; counts are those of the particles kept (exactly in all, about so per \
+              species), and the height follows from the packing, so `cell` takes an `aspect` only. With walls in z the \
+              bed stays as it fell on the lower wall, and the upper one touches it unless `sides` are given.",
+    keys: &[
+        key(
+            "margin",
+            number(Dimension::NONE, Range::closed(1.0, 100.0)),
+            Default::Number(4.0),
+            "Height that is cut off at the floor and at the surface, in largest diameters; periodic z axis only.",
+        ),
+        key(
+            "remaining_overlap",
+            number(Dimension::NONE, Range::closed(1e-10, 0.1)),
+            Default::Number(1e-6),
+            "Largest overlap left at the cut, as a fraction of the smaller radius; periodic z axis only.",
         ),
         REPLICATE,
         PERTURBATION,

@@ -235,11 +235,22 @@ pub enum PackingConfig {
         /// Give up after this many moves per particle.
         max_moves_per_particle: f64,
     },
+    /// Spheres dropped one after the other.
+    DropAndRoll(DropAndRollConfig),
     /// From a CSV, HDF5 or LAMMPS data file.
     File {
         /// Path as resolved against the configuration's folder.
         path: PathBuf,
     },
+}
+
+/// Drop and roll, and how the cell is cut out of the bed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DropAndRollConfig {
+    /// Height cut off above the floor and below the surface, over the largest diameter.
+    pub margin: f64,
+    /// Largest overlap that the relaxation of the cut leaves, over the smaller radius.
+    pub remaining_overlap: f64,
 }
 
 /// Copies of the packing side by side, and the random displacement of every particle.

@@ -3,7 +3,8 @@
 use super::alternatives::Chosen;
 use super::section::Section;
 use super::{
-    Boundary, CellConfig, OutputConfig, PackingConfig, ParallelConfig, Replication, SimdConfig, Species, TimeStepConfig,
+    Boundary, CellConfig, DropAndRollConfig, OutputConfig, PackingConfig, ParallelConfig, Replication, SimdConfig,
+    Species, TimeStepConfig,
 };
 use std::path::{Path, PathBuf};
 
@@ -64,6 +65,12 @@ pub(super) fn read_packing(
             section.record_text("path", &path.to_string_lossy());
             Some((PackingConfig::File { path }, replication?))
         }
+        Chosen::Table("drop_and_roll", section) => {
+            let (margin, remaining_overlap) = (section.number("margin"), section.number("remaining_overlap"));
+            let replication = read_replication(&section, cell);
+            let settings = DropAndRollConfig { margin: margin?, remaining_overlap: remaining_overlap? };
+            Some((PackingConfig::DropAndRoll(settings), replication?))
+        }
         Chosen::Table(_, section) => {
             let contraction_rate = section.number("contraction_rate");
             let max_moves_per_particle = section.number("max_moves_per_particle");
@@ -109,6 +116,9 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         }
         return;
     }
+    if let PackingConfig::DropAndRoll(_) = packing {
+        check_floor(&section, cell);
+    }
     let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
@@ -130,6 +140,22 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
             );
             section.problem("sides", message, "make every side at least one diameter");
         }
+    }
+}
+
+/// Whether drop and roll can fill the cell: periodic beside the bed, and as high as the bed becomes.
+fn check_floor(section: &Section, cell: &CellConfig) {
+    if let Some(axis) = (0..2).find(|axis| cell.boundary[*axis] != Boundary::Periodic) {
+        let message = format!("packing.drop_and_roll cannot pack between walls of the {} axis", ["x", "y"][axis]);
+        section.problem("boundary", message, "make x and y periodic, or use packing.random_close");
+    }
+    let height = "packing.drop_and_roll finds the height of the cell by itself";
+    if cell.solid_fraction.is_some() {
+        let remedy = "remove it (equal spheres attain about 0.58), or use packing.random_close";
+        section.problem("solid_fraction", height, remedy);
+    }
+    if cell.sides.is_some() && cell.boundary[2] == Boundary::Periodic {
+        section.problem("sides", height, "give `aspect` instead, or walls in z, or use packing.random_close");
     }
 }
 

@@ -14,6 +14,8 @@ const BYTES_PER_PARTICLE: f64 = 450.0;
 const COORDINATION: f64 = 6.0;
 /// Solid fraction assumed where random close packing finds its own.
 const RANDOM_CLOSE: f64 = 0.635;
+/// Solid fraction of equal spheres after drop and roll.
+const DROP_AND_ROLL: f64 = 0.58;
 /// Largest ε̇²·density_scaling \[1/s²\] at which packings near jamming still answer quasi-statically.
 const INERTIA_LIMIT: f64 = 1e4;
 
@@ -72,9 +74,8 @@ impl Estimate {
         let solid_volume: f64 = copies * volumes.sum::<f64>();
         let solid_fraction = match (config.cell.sides, &config.packing) {
             (_, PackingConfig::File { .. }) => None,
-            (Some(sides), PackingConfig::RandomClose { .. }) => {
-                Some(solid_volume / (copies * sides[0] * sides[1] * sides[2]))
-            }
+            (Some(sides), _) => Some(solid_volume / (copies * sides[0] * sides[1] * sides[2])),
+            (None, PackingConfig::DropAndRoll(_)) => Some(DROP_AND_ROLL),
             (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
         let mut progress = Progress::default();

@@ -85,6 +85,16 @@ impl Grid {
     /// Grid whose cells are as wide as the diameter times `scale` of the largest ball in each class.
     #[must_use]
     pub fn new(cell: Cell, balls: &[Ball], scale: f64) -> Self {
+        let mut grid = Self::empty(cell, balls, scale);
+        for (index, ball) in balls.iter().enumerate() {
+            grid.add(index, ball.position);
+        }
+        grid
+    }
+
+    /// A grid for these balls that holds none of them yet.
+    #[must_use]
+    pub fn empty(cell: Cell, balls: &[Ball], scale: f64) -> Self {
         let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
         let classes: Vec<u8> = balls.iter().map(|ball| size_class(ball.radius, largest)).collect();
         let mut levels = Vec::new();
@@ -105,11 +115,12 @@ impl Grid {
         }
         let level = classes.iter().map(|class| level_of_class[usize::from(*class)]).collect();
         let empty = vec![NONE; balls.len()];
-        let mut grid = Self { cell, levels, head: vec![NONE; first], next: empty.clone(), place: empty, level };
-        for (index, ball) in balls.iter().enumerate() {
-            grid.insert(index, grid.place_of(index, ball.position));
-        }
-        grid
+        Self { cell, levels, head: vec![NONE; first], next: empty.clone(), place: empty, level }
+    }
+
+    /// Put a ball that the grid does not hold yet into its linked cell.
+    pub fn add(&mut self, index: usize, position: [f64; 3]) {
+        self.insert(index, self.place_of(index, position));
     }
 
     /// The linked cell of a ball, as a key to sort by.

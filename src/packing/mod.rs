@@ -1,12 +1,14 @@
 //! Initial state: sizes, positions and velocities of all particles, by id. Made by one process, serially
 //! and from counter-based random numbers; knows nothing of ranks.
 
+pub mod drop_and_roll;
 pub mod file;
 pub mod grid;
 pub mod overlap;
 pub mod radii;
 pub mod random;
 pub mod rcp;
+pub mod relax;
 pub mod replicate;
 pub mod tournament;
 
@@ -40,6 +42,7 @@ pub fn build(config: &Config) -> Result<Packing> {
         PackingConfig::RandomClose { contraction_rate, max_moves_per_particle } => {
             random_close(config, *contraction_rate, *max_moves_per_particle)?
         }
+        PackingConfig::DropAndRoll(settings) => drop_and_roll::input::build(config, settings)?,
         PackingConfig::File { path } => from_file(config, path)?,
     };
     if packing.particles.is_empty() {

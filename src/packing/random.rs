@@ -16,6 +16,8 @@ pub enum Purpose {
     Velocity = 3,
     /// Displacements of a replicated packing.
     Perturbation = 4,
+    /// The order in which spheres are dropped.
+    DropOrder = 5,
 }
 
 /// The sequence of random numbers of one particle for one purpose.
