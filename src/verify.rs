@@ -3,6 +3,7 @@
 
 mod collision;
 mod conservation;
+mod hereditary;
 mod oblique;
 mod scene;
 mod sliding;
@@ -98,6 +99,7 @@ const CASES: &[Case] = &[
     Case { name: "oblique impact of two spheres (Chung & Ooi 2011, test 5)", run: oblique::spheres },
     Case { name: "Maxwell-Zener strain rates (W Fig. 9)", run: viscoelastic::rates },
     Case { name: "Maxwell-Zener relaxation (W Fig. 10)", run: viscoelastic::relaxation },
+    Case { name: "generalised Maxwell: hereditary integral, several branches", run: hereditary::branches },
     Case { name: "sliding block and rolling sphere", run: sliding::to_rest },
     Case { name: "momentum and energy of a periodic gas", run: conservation::gas },
     Case { name: "order of the integrator", run: conservation::order },
