@@ -103,8 +103,8 @@ const FIGURES: &[Figure] = &[
         number: 13,
         title: "a loose packing bears nothing until it is dense enough",
         setting: "226 PVDF spheres of 2.5 µm, dropped and rolled, then compressed by 10 % quasi-statically; dashed: \
-                  dynamic from\n7 % on. Input `configs/wahn2022/fig13.toml`. W gives no friction: 0.1, as in Figs. 14 to \
-                  16.",
+                  dynamic from\n7 % on. Input `configs/wahn2022/fig13.toml`. W gives no friction: 0.01 \
+                  brings the onset to W's 7 %.",
         plan: loose::plan,
         judge: loose::judge,
     },
