@@ -7,15 +7,15 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
-/// Shades per channel to try, until the picture has at most 256 colours; six always do.
-const SHADES: [u32; 5] = [52, 32, 18, 12, 6];
+/// Colours that a palette holds.
+const COLOURS: usize = 256;
 
 /// Write RGB pixels, row by row, as `path`.
 ///
 /// # Errors
 /// [`Error::File`] when the file cannot be written.
 pub(super) fn write(path: &Path, pixels: &[u8], (width, height): (u32, u32)) -> Result<()> {
-    let (palette, indices) = SHADES.iter().find_map(|shades| indexed(pixels, *shades)).unwrap_or_default();
+    let (palette, indices) = indexed(pixels);
     let failed = |reason: String| Error::File {
         path: path.to_path_buf(),
         message: format!("cannot write the picture: {reason}"),
@@ -32,22 +32,24 @@ pub(super) fn write(path: &Path, pixels: &[u8], (width, height): (u32, u32)) -> 
     writer.finish().map_err(|error| failed(error.to_string()))
 }
 
-/// Palette and index per pixel with so many shades per channel; none if that makes more than 256 colours.
-fn indexed(pixels: &[u8], shades: u32) -> Option<(Vec<u8>, Vec<u8>)> {
-    let steps = shades - 1;
-    let rounded = |value: u8| (((u32::from(value) * steps + 127) / 255) * 255 / steps) as u8;
-    let (mut palette, mut known) = (Vec::new(), FxHashMap::default());
-    let mut indices = Vec::with_capacity(pixels.len() / 3);
-    for pixel in pixels.chunks_exact(3) {
-        let colour = [rounded(pixel[0]), rounded(pixel[1]), rounded(pixel[2])];
-        let next = known.len();
-        let index = *known.entry(colour).or_insert_with(|| {
-            palette.extend(colour);
-            next
-        });
-        indices.push(u8::try_from(index).ok()?);
-    }
-    Some((palette, indices))
+/// The most frequent colours, and for each pixel the index of its own or of the nearest one: areas and lines keep
+/// their colours, and the thousands of shades at their edges lose a hair.
+fn indexed(pixels: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let colours = || pixels.chunks_exact(3).map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+    let mut count: FxHashMap<[u8; 3], u64> = FxHashMap::default();
+    colours().for_each(|colour| *count.entry(colour).or_default() += 1);
+    let mut order: Vec<([u8; 3], u64)> = count.into_iter().collect();
+    order.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+    let palette: Vec<[u8; 3]> = order.iter().take(COLOURS).map(|entry| entry.0).collect();
+    let nearest = |colour: [u8; 3]| {
+        let distance = |other: &[u8; 3]| {
+            colour.iter().zip(other).map(|(a, b)| u32::from(a.abs_diff(*b)) * u32::from(a.abs_diff(*b))).sum::<u32>()
+        };
+        let index = (0..palette.len()).min_by_key(|index| distance(&palette[*index]));
+        index.unwrap_or(0) as u8
+    };
+    let place: FxHashMap<[u8; 3], u8> = order.iter().map(|entry| (entry.0, nearest(entry.0))).collect();
+    (palette.concat(), colours().map(|colour| place[&colour]).collect())
 }
 
 #[cfg(test)]
@@ -55,12 +57,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn black_and_white_stay_and_many_colours_are_rounded() {
-        let (palette, indices) = indexed(&[0, 0, 0, 255, 255, 255, 0, 0, 0], 52).expect("two colours");
-        assert_eq!((palette, indices), (vec![0, 0, 0, 255, 255, 255], vec![0, 1, 0]));
-        let all: Vec<u8> = (0..=255).flat_map(|r| (0..=255).flat_map(move |g| [r, g, r ^ g])).collect();
-        assert!(indexed(&all, 52).is_none());
-        let (palette, indices) = indexed(&all, 6).expect("at most 216 colours");
-        assert!(palette.len() <= 3 * 216 && indices.len() == 65536);
+    fn frequent_colours_stay_and_rare_ones_take_the_nearest() {
+        assert_eq!(indexed(&[9, 9, 9, 255, 0, 0, 9, 9, 9]), (vec![9, 9, 9, 255, 0, 0], vec![0, 1, 0]));
+        // 256 colours twice, and one once that is next to the last of them.
+        let frequent = (0..=255).flat_map(|value| [0, value, 0]);
+        let pixels: Vec<u8> = frequent.clone().chain(frequent).chain([1, 255, 0]).collect();
+        let (palette, indices) = indexed(&pixels);
+        assert_eq!((palette.len(), indices.len()), (3 * 256, 513));
+        assert_eq!(indices[512], indices[255]);
     }
 }
