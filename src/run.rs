@@ -1,6 +1,7 @@
 //! A run from input to final digest: outer loop over steps, what is written when, signals, restart.
 
 mod efforts;
+mod inertia;
 mod output;
 mod signals;
 

@@ -2,7 +2,9 @@
 
 mod overlap;
 
-use crate::config::{Boundary, Config, Motion, PackingConfig, ParallelConfig, Replication, TimeStepConfig};
+use crate::config::{
+    Boundary, Config, Motion, PackingConfig, PairConfig, ParallelConfig, Replication, Routine, TimeStepConfig,
+};
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
 use crate::exchange::{
@@ -153,6 +155,12 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         .collect();
     let extremes = extremes(comm, &species, &initial.particles);
     let passes: Vec<_> = config.pairs.iter().map(pass::build).collect();
+    let static_passes = if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
+        let damped = config.pairs.iter().map(|pair| artificially_damped(pair, config.quasi_static.restitution));
+        damped.map(|pair| pass::build(&pair)).collect()
+    } else {
+        Vec::new()
+    };
     let fraction = match config.time_step {
         TimeStepConfig::Automatic { reference_overlap, .. } => reference_overlap,
         TimeStepConfig::Fixed(_) => 1e-3,
@@ -183,6 +191,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         config: Arc::clone(config),
         species,
         passes,
+        static_passes,
         programme: programme(config),
         time_step,
         lists,
@@ -193,6 +202,17 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
     };
     agree(comm, check_fit(&model, initial))?;
     Ok(model)
+}
+
+/// The pair with every dashpot that its laws have, at this restitution coefficient: the artificial damping of the
+/// quasi-static routine. Laws and memory are the same.
+fn artificially_damped(pair: &PairConfig, restitution: f64) -> PairConfig {
+    let mut pair = pair.clone();
+    pair.properties.restitution = restitution;
+    for choice in [Some(&mut pair.normal), pair.tangential.as_mut(), pair.rolling.as_mut()].into_iter().flatten() {
+        choice.damp();
+    }
+    pair
 }
 
 fn check_fit(model: &Model, initial: &Initial) -> Result<()> {

@@ -45,6 +45,8 @@ pub struct QuasiStaticConfig {
     pub max_blocks: u64,
     /// What removes the kinetic energy.
     pub damping: Damping,
+    /// Restitution coefficient of the contact laws' dashpots in quasi-static stages.
+    pub restitution: f64,
     /// Factor β of the pseudo time step.
     pub safety: f64,
     /// Largest mean unbalanced force over mean contact force at equilibrium.
@@ -84,13 +86,14 @@ pub(super) fn read(root: &Section) -> Option<QuasiStaticConfig> {
         Some(Chosen::Table(..)) => Some(Damping::Contact),
         _ => None,
     };
-    let safety = section.number("safety");
+    let (restitution, safety) = (section.number("restitution"), section.number("safety"));
     let thresholds = ["max_unbalanced_ratio", "max_kinetic_ratio", "max_displacement_ratio", "touching_overlap"];
     let [unbalanced, kinetic, displacement, touching] = thresholds.map(|name| section.number(name));
     Some(QuasiStaticConfig {
         substeps: substeps?,
         max_blocks: max_blocks?,
         damping: damping?,
+        restitution: restitution?,
         safety: safety?,
         max_unbalanced_ratio: unbalanced?,
         max_kinetic_ratio: kinetic?,

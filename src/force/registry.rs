@@ -160,6 +160,17 @@ impl LawEntry {
 }
 
 impl LawChoice {
+    /// Switch on the dashpot of a law that declares one: a parameter `damping`, `none` or false without it.
+    pub fn damp(&mut self) {
+        let Some(index) = self.law.parameters.iter().position(|parameter| parameter.name == "damping") else { return };
+        match (self.law.parameters[index].kind, &mut self.values[index]) {
+            (ParameterKind::Flag, value) => *value = ParameterValue::Flag(true),
+            (ParameterKind::Choice(words), ParameterValue::Choice(chosen)) if words[*chosen] == "none" => {
+                *chosen = words.iter().position(|word| *word == "tsuji").unwrap_or(*chosen);
+            }
+            _ => {}
+        }
+    }
     /// Value of a number parameter; panics on a name that the law does not declare (our own bug).
     #[must_use]
     pub fn number(&self, name: &str) -> f64 {

@@ -53,6 +53,9 @@ pub struct HistoryRow {
     pub fabric: [f64; 6],
     /// Equilibria that quasi-static stages have found so far.
     pub increment: u64,
+    /// Inertial number `ε̇ d √(ρ/p)`: largest strain rate, diameter and (scaled) density, mean stress p; 0 while the cell
+    /// rests, NaN under strain without stress.
+    pub inertial_number: f64,
 }
 
 /// Column names in the order of [`HistoryRow::values`].
@@ -69,7 +72,7 @@ pub fn columns() -> Vec<String> {
     names.extend(LEDGER.map(|entry| format!("{entry}_J")));
     names.extend(["unbalanced_ratio", "max_overlap_ratio"].map(String::from));
     names.extend(TENSOR.map(|part| format!("fabric_{part}")));
-    names.push("increment".to_owned());
+    names.extend(["increment", "inertial_number"].map(String::from));
     names
 }
 
@@ -100,7 +103,7 @@ impl HistoryRow {
         reals(&self.ledger);
         reals(&[self.unbalanced_ratio, self.max_overlap_ratio]);
         reals(&self.fabric);
-        cells.push(Cell::Count(self.increment));
+        cells.extend([Cell::Count(self.increment), Cell::Real(self.inertial_number)]);
         cells
     }
 
@@ -143,6 +146,7 @@ impl HistoryRow {
             *part = real(word())?;
         }
         row.increment = count(word())?;
+        row.inertial_number = real(word())?;
         Ok(row)
     }
 }
@@ -270,6 +274,7 @@ mod tests {
             max_overlap_ratio: 0.1,
             fabric: [6.0, 5.0, 4.0, 3.0, 2.0, 1.0],
             increment: 2 * step,
+            inertial_number: 1e-5 * x,
             ..HistoryRow::default()
         }
     }

@@ -34,6 +34,7 @@ pub fn config(species: Vec<Species>) -> Config {
             substeps: 50,
             max_blocks: 100,
             damping: Damping::Contact,
+            restitution: 0.5,
             safety: 0.3,
             max_unbalanced_ratio: 1e-4,
             max_kinetic_ratio: 1e-8,

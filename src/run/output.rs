@@ -1,6 +1,7 @@
 //! What a run writes while it goes: history, snapshots, the terminal, the tables at its end.
 
 use super::efforts::{Efforts, resident_bytes};
+use super::inertia::Inertia;
 use crate::config::{self, AxisControl, Config, Interval, Routine};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
@@ -88,6 +89,7 @@ pub struct RunOutput {
     history: Option<HistoryWriter>,
     snapshots: Option<SnapshotSeries>,
     log: Option<Log>,
+    inertia: Inertia,
     efforts: Efforts,
 }
 
@@ -110,7 +112,14 @@ impl RunOutput {
             Some(_) => Some(SnapshotSeries::resume(comm, directory, global.snapshots)?),
             None => None,
         };
-        Ok(Self { config: Arc::clone(config), history, snapshots, log: first.then(Log::new), efforts })
+        Ok(Self {
+            config: Arc::clone(config),
+            history,
+            snapshots,
+            log: first.then(Log::new),
+            inertia: Inertia::default(),
+            efforts,
+        })
     }
 
     /// Write what was wanted of a report. Collective.
@@ -129,6 +138,9 @@ impl RunOutput {
             agree(simulation.comm(), written)?;
             let done = progress(&self.config, simulation.global());
             if let Some(log) = &mut self.log {
+                for line in self.inertia.follow(&self.config, simulation.global().stage, &report.row) {
+                    log.line(&line);
+                }
                 log.row(&report.row, done);
             }
             simulation.global_mut().history_rows += 1;

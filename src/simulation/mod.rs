@@ -46,6 +46,8 @@ pub struct Model {
     pub species: Vec<SpeciesConstants>,
     /// One contact pass per pair of materials.
     pub passes: Vec<Box<dyn PairPass>>,
+    /// The same with the artificial damping of quasi-static stages; empty without such stages.
+    pub static_passes: Vec<Box<dyn PairPass>>,
     /// Stages and kinematics.
     pub programme: LoadProgramme,
     /// Bounds of the time step.
@@ -331,17 +333,6 @@ impl Simulation {
         take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
     }
 
-    /// Let the laws know the time since the last evaluation.
-    fn prepare(&mut self) {
-        let (elapsed, relaxed) = (self.global.previous_time_step, self.is_quasi_static());
-        if self.prepared_for != Some((elapsed.to_bits(), relaxed)) {
-            self.prepared_for = Some((elapsed.to_bits(), relaxed));
-            for pass in &mut self.model.passes {
-                pass.prepare(elapsed, relaxed);
-            }
-        }
-    }
-
     fn pass_input<'a>(&self, motion: &'a CellMotion) -> PassInput<'a> {
         PassInput {
             motion,
@@ -357,7 +348,8 @@ impl Simulation {
     fn observe_contacts(&mut self, wanted: Wanted) -> Observation {
         self.timers.start(Stage::Observe);
         let motion = self.cell_motion();
-        let phase = Phase { passes: &self.model.passes, input: self.pass_input(&motion) };
+        let passes = self.model.passes_in_force(self.is_quasi_static());
+        let phase = Phase { passes, input: self.pass_input(&motion) };
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
         let particles = &self.particles;
@@ -372,8 +364,9 @@ impl Simulation {
         let cell = self.cell_motion();
         let motion = self.step_motion(plan);
         let input = self.pass_input(&cell);
+        let relaxed = self.is_quasi_static();
         let Self { comm, model, halo, particles, contacts, lines, reference, ghost_wraps, timers, .. } = self;
-        let phase = Phase { passes: &model.passes, input };
+        let phase = Phase { passes: model.passes_in_force(relaxed), input };
         let (inner, strips) = (contacts.inner, contacts.strips.len());
         let moving = if inner == strips { particles.owned } else { contacts.strips[inner].particles.start };
         let inner_part = |particles: &mut Particles,

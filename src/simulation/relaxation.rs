@@ -2,11 +2,12 @@
 //! equilibrium between blocks of substeps. A substep is a step like any other in which time does not pass; its
 //! pseudo time step has no meaning beside stability.
 
-use super::{Report, Simulation};
+use super::{Model, Report, Simulation};
 use crate::config::{AxisControl, Damping, Kinematics, QuasiStaticConfig};
 use crate::error::{Error, Result};
 use crate::exchange::{ExactSum, exact_sum};
 use crate::force::observe::Wanted;
+use crate::force::pass::PairPass;
 use crate::integrate::time_step::Measured;
 use crate::state::QuasiStaticState;
 
@@ -32,7 +33,27 @@ impl Residuals {
     }
 }
 
+impl Model {
+    /// The contact passes of the routine that runs.
+    #[must_use]
+    pub fn passes_in_force(&self, quasi_static: bool) -> &[Box<dyn PairPass>] {
+        if quasi_static { &self.static_passes } else { &self.passes }
+    }
+}
+
 impl Simulation {
+    /// Let the laws know the time since the last evaluation.
+    pub(super) fn prepare(&mut self) {
+        let (elapsed, relaxed) = (self.global.previous_time_step, self.is_quasi_static());
+        if self.prepared_for != Some((elapsed.to_bits(), relaxed)) {
+            self.prepared_for = Some((elapsed.to_bits(), relaxed));
+            let Model { passes, static_passes, .. } = &mut self.model;
+            for pass in if relaxed { static_passes } else { passes } {
+                pass.prepare(elapsed, relaxed);
+            }
+        }
+    }
+
     /// The running stage is quasi-static.
     #[must_use]
     pub fn is_quasi_static(&self) -> bool {

@@ -93,6 +93,7 @@ impl Simulation {
             max_overlap_ratio: largest[1],
             fabric: six(Sum::Fabric as usize, contacts),
             increment: self.global.quasi_static.map_or(0, |state| state.increments),
+            inertial_number: self.inertial_number((stress[0] + stress[1] + stress[2]) / 3.0),
         };
         self.timers.stop();
         Report {
@@ -143,6 +144,20 @@ impl Simulation {
             }
         }
         max_speed.sqrt()
+    }
+
+    /// `I = ε̇ d √(ρ/p)` with the largest strain rate, diameter and density: 0 at rest, NaN without pressure.
+    fn inertial_number(&self, pressure: f64) -> f64 {
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m, v| if v > m { v } else { m });
+        let rate = largest(&mut self.global.strain_rate.iter().map(|rate| rate.abs()));
+        if rate == 0.0 {
+            return 0.0;
+        }
+        if pressure <= 0.0 {
+            return f64::NAN;
+        }
+        let density = largest(&mut self.model.species.iter().map(|species| species.density));
+        rate * (2.0 * self.model.max_radius) * (density / pressure).sqrt()
     }
 
     /// L̇/L where velocities are absolute (BC), zero where they are peculiar (BCT).

@@ -27,22 +27,29 @@ pub static QUASI_STATIC: Table = Table {
             "What removes the kinetic energy, beside the dashpots of the contact laws.",
         ),
         key(
+            "restitution",
+            number(Dimension::NONE, Range::FRACTION),
+            Default::Number(0.5),
+            "What the dashpots of the contact laws take for the restitution coefficient in quasi-static stages, where \
+             they are artificial damping; the material's own has no effect there.",
+        ),
+        key(
             "safety",
             number(Dimension::NONE, Range::closed(0.01, 0.6)),
             Default::Number(0.3),
             "The pseudo time step is safety · √(smallest mass / largest contact stiffness).",
         ),
-        threshold("max_unbalanced_ratio", 1e-4, "Mean unbalanced force over mean contact force at equilibrium."),
-        threshold("max_kinetic_ratio", 1e-8, "Kinetic over elastic energy at equilibrium."),
+        threshold("max_unbalanced_ratio", 1e-3, "Mean unbalanced force over mean contact force at equilibrium."),
+        threshold("max_kinetic_ratio", 1e-6, "Kinetic over elastic energy at equilibrium."),
         threshold(
             "max_displacement_ratio",
-            1e-5,
+            1e-4,
             "Way of the fastest particle in one more block, over the largest radius, at equilibrium.",
         ),
         key(
             "touching_overlap",
             number(Dimension::NONE, Range::between(0.0, 0.1)),
-            Default::Number(1e-4),
+            Default::Number(5e-4),
             "Overlap over radius whose force and energy are the least that ratios refer to: where all contacts are \
              weaker, particles just touch.",
         ),
@@ -72,9 +79,9 @@ static FIRE: Table = Table {
     meaning: "Fast inertial relaxation: v ← (1−α) v + α |v| F/|F| while the power F·v is positive, else v = 0.",
     keys: &[key(
         "mixing",
-        number(Dimension::NONE, Range::FRACTION),
-        Default::Number(0.1),
-        "α after a stop; it shrinks by 1 % per substep from the fifth on.",
+        number(Dimension::NONE, Range::closed(0.0, 1.0)),
+        Default::Number(0.05),
+        "α after a stop; it shrinks by 1 % per substep from the fifth on. 0: velocities only stop.",
     )],
 };
 
