@@ -5,7 +5,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint bench bench-peers build install docs serial static setup setup-test
+.PHONY: help demo test figures-wahn2022 lint bench bench-peers build install docs serial static setup setup-test
 
 # Before each command: PATH, root and HDF5 as this machine needs them.
 ENVIRONMENT := . scripts/environment.sh; hdf5_dir=$$(parallel_hdf5_dir); \
@@ -16,6 +16,7 @@ CARGO_FLAGS := --locked
 help:
 	@echo "make demo       install what is missing, build, run the quickstart on two ranks"
 	@echo "make test       the same set-up, then all tests"
+	@echo "make figures-wahn2022  the figures of the viscoelastic paper, compared with what they must show"
 	@echo "make lint       formatting, clippy, architecture, scripts"
 	@echo "make bench      particle-steps/s on one and two ranks and threads"
 	@echo "make bench-peers  the same packings in LAMMPS and LIGGGHTS"
@@ -44,6 +45,10 @@ test: setup-test
 	@$(ENVIRONMENT) cargo test --release $(CARGO_FLAGS)
 	@scripts/check_snapshots.sh "$(TARGET)/release/dem-mpi"
 	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" verify
+
+# FIGURES="--seeds 5 --only 15,16" widens or narrows it; pictures and table in runs/wahn2022.
+figures-wahn2022: build
+	@$(ENVIRONMENT) "$(TARGET)/release/dem-mpi" verify wahn2022 $(FIGURES)
 
 lint: setup
 	@$(ENVIRONMENT) cargo fmt --check

@@ -2,6 +2,7 @@
 
 mod draw;
 mod panel;
+mod png;
 
 pub use draw::{Curve, draw_curves};
 pub use panel::{Corner, Ink, Panel, Series, Style, draw_panel};

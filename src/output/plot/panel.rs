@@ -1,6 +1,7 @@
 //! A picture for print: lines in several styles, bands, marks, a legend where the author wants it.
 
 use super::draw::{FONT, axes_text, provide_font};
+use super::png;
 use crate::error::{Error, Result};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -105,7 +106,7 @@ pub struct Panel {
     pub series: Vec<Series>,
 }
 
-const SIZE: (u32, u32) = (720, 510);
+const SIZE: (u32, u32) = (860, 600);
 /// Pixels of a PNG per unit of [`SIZE`]: lines have whole-pixel corners, which show at one.
 const PNG_SCALE: u32 = 2;
 
@@ -127,7 +128,10 @@ pub fn draw_panel(path: &Path, panel: &Panel) -> Result<()> {
         Some("svg") => page(SVGBackend::new(path, SIZE).into_drawing_area(), 1, panel),
         Some("png") => {
             let size = (SIZE.0 * PNG_SCALE, SIZE.1 * PNG_SCALE);
-            page(BitMapBackend::new(path, size).into_drawing_area(), PNG_SCALE, panel)
+            let mut pixels = vec![0; (size.0 * size.1 * 3) as usize];
+            page(BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area(), PNG_SCALE, panel)
+                .map(|()| png::write(path, &pixels, size))
+                .and_then(|written| written.map_err(|error| error.to_string()))
         }
         _ => Err("pictures end in .svg or .png".to_owned()),
     };

@@ -83,6 +83,7 @@ const INPUTS: &[(&str, &str)] = &[
     ("wahn2022/fig09.toml", include_str!("../../../configs/wahn2022/fig09.toml")),
     ("wahn2022/fig10.toml", include_str!("../../../configs/wahn2022/fig10.toml")),
     ("wahn2022/fig12.toml", include_str!("../../../configs/wahn2022/fig12.toml")),
+    ("wahn2022/fig13.toml", include_str!("../../../configs/wahn2022/fig13.toml")),
     ("wahn2022/fig14.toml", include_str!("../../../configs/wahn2022/fig14.toml")),
     ("wahn2022/fig15.toml", include_str!("../../../configs/wahn2022/fig15.toml")),
     ("wahn2022/fig16.toml", include_str!("../../../configs/wahn2022/fig16.toml")),
@@ -135,7 +136,7 @@ impl Workshop {
             "dem-mpi configs/{config}{}",
             job.sets.iter().fold(String::new(), |all, set| all + " --set '" + set + "'")
         );
-        let stamp = format!("{command}\ninput {:016x}\n", xxhash_rust::xxh3::xxh3_64(text.as_bytes()));
+        let stamp = format!("{command}\ninput {:016x}\n", fingerprint(text));
         let wall = match self.reuse.then(|| finished(&record, &stamp)).flatten() {
             Some(wall) => wall,
             None => {
@@ -176,4 +177,10 @@ impl Workshop {
 fn finished(record: &Path, stamp: &str) -> Option<f64> {
     let text = fs::read_to_string(record).ok()?;
     text.strip_prefix(stamp)?.strip_prefix("wall ")?.strip_suffix(" s\n")?.parse().ok()
+}
+
+/// Of a configuration without its comments.
+fn fingerprint(text: &str) -> u64 {
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    xxhash_rust::xxh3::xxh3_64(lines.join("\n").as_bytes())
 }

@@ -6,6 +6,7 @@ mod assembly;
 pub(super) mod check;
 mod curves;
 mod job;
+mod loose;
 mod nmc;
 mod rates;
 mod relaxation;
@@ -99,23 +100,38 @@ const FIGURES: &[Figure] = &[
         judge: two_spheres::judge_finite_elements,
     },
     Figure {
+        number: 13,
+        title: "a loose packing bears nothing until it is dense enough",
+        setting: "226 PVDF spheres of 2.5 µm, dropped and rolled, then compressed by 10 % quasi-statically; dashed: \
+                  dynamic from\n7 % on. Input `configs/wahn2022/fig13.toml`. W gives no friction: 0.01 \
+                  brings the onset to W's 7 %.",
+        plan: loose::plan,
+        judge: loose::judge,
+    },
+    Figure {
         number: 14,
         title: "250 NMC spheres, quasi-static and dynamic",
-        setting: "",
+        setting: "Random close packings of 0.635, 1 %, input `configs/wahn2022/fig14.toml`. Dynamic runs keep strain rate \
+                  squared times\ndensity scaling at 10⁴ s⁻², except those *with W's inertia* (HSD over 1 s with 10⁹ × the \
+                  physical density, 10⁵ s⁻²).",
         plan: nmc::plan,
         judge: nmc::judge,
     },
     Figure {
         number: 15,
         title: "250 PVDF spheres at several strain rates",
-        setting: "",
+        setting: "Random close packings of 0.635, 0.5 % (BCT), input `configs/wahn2022/fig15.toml`. First with strain rate \
+                  squared times\ndensity scaling at 10⁴ s⁻², between *dynamic elastic* runs of the same kinematics, at \
+                  W's rates and slower ones\ndown to the soft limit; then with W's own inertia (10⁶ to 10⁸ s⁻², no dashpot \
+                  beside the branch), each beside the\nelastic run with the same inertia.",
         plan: rates::plan,
         judge: rates::judge,
     },
     Figure {
         number: 16,
         title: "relaxation of 250 PVDF spheres",
-        setting: "",
+        setting: "Random close packings of 0.635, 0.3 % in 1 s (the caption; the text also says 1.0 /s), then held to 10 s. \
+                  Input\n`configs/wahn2022/fig16.toml`; strain rate squared times density scaling 9·10³ s⁻².",
         plan: relaxation::plan,
         judge: relaxation::judge,
     },

@@ -59,6 +59,7 @@ pub fn judge(runs: &Runs, extent: &Extent) -> Judged<Judgement> {
         .collect();
     let peak: Vec<f64> = ratios(&mz, &soft, loaded).into_iter().map(|ratio| ratio / PVDF.stiffening(loaded)).collect();
     let checks = vec![
+        Check::within("quasi-static E_soft at 0.3 % (W: 0.0127 MPa; sets the friction)", [0.010, 0.016], Unit::Of("MPa"), &ends.iter().map(|end| end[0].1).collect::<Vec<_>>()),
         Check::within("MZ over elastic E_soft at 1 s, over the theory of one contact", [0.99, 1.01], Unit::Plain, &peak),
         Check::within("MZ over elastic E_soft of the same kinematics at 10 s", [0.99, 1.01], Unit::Plain, &ratios(&mz, &soft, held)),
         Check::within("relaxation time from the decay of 1.5 to 3.5 s", [1.7, 1.9], Unit::Of("s"), &decay),

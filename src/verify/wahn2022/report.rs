@@ -75,6 +75,8 @@ pub fn write(folder: &Path, command: &str, chapters: &[Chapter], total: f64) -> 
         "**{passed} passed, {findings} findings, {failed} failed; {total:.0} s wall time.** A *finding* is a statement of \
          the paper, or a\nrequirement, that does not come out, with the measurement that shows why.\n"
     );
+    text.push_str(include_str!("preface.md"));
+    text.push('\n');
     for chapter in chapters {
         let _ = writeln!(text, "## Fig. {}: {}\n\n{}\n", chapter.number, chapter.title, chapter.setting);
         for name in &chapter.pictures {
