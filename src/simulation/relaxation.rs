@@ -200,11 +200,7 @@ impl Simulation {
                 self.steer_downhill(&mut state, mixing, time_step);
             }
             Damping::Local { coefficient } => {
-                // The acceleration is that of the step before: a loss must not turn the motion round.
-                self.damp(|v, a| {
-                    let kept = v.abs() - coefficient * a.abs() * time_step;
-                    if kept > 0.0 { kept.copysign(v) } else { 0.0 }
-                });
+                self.damp(|v, a| v - coefficient * a.abs() * time_step * if v > 0.0 { 1.0 } else { -1.0 });
             }
             Damping::Viscous { share } => self.damp(|v, _| (1.0 - share) * v),
             Damping::Contact => self.damp(|v, _| v),
