@@ -54,8 +54,7 @@ fn a_small_packing_relaxes_to_its_elastic_companion() {
     for name in ["fig16a", "fig16b"] {
         png_size(&folder.join(format!("wahn2022/{name}.png")));
     }
-    // A table with a failure exits with 1, one without with 0.
-    assert_eq!(first.status.code(), Some(i32::from(table.contains("| FAIL |"))), "{}", text(&first));
+    assert_eq!(first.status.code(), Some(0), "{}", text(&first));
 
     let record = fs::read_to_string(folder.join("runs/fig16/soft-1/verify.txt")).expect("the record is there");
     // A run that fails makes the figure fail, and says where to look.

@@ -194,8 +194,11 @@ fn band<B: DrawingBackend>(chart: &mut Chart<'_, B>, series: &Series) -> Drawn {
     if series.band.len() < 2 {
         return Ok(());
     }
-    let upper = series.band.iter().map(|&(x, _, high)| (x, high));
-    let outline: Vec<(f64, f64)> = upper.chain(series.band.iter().rev().map(|&(x, low, _)| (x, low))).collect();
+    let (x, y) = (chart.x_range(), chart.y_range());
+    let inside = |&&(at, low, _): &&(f64, f64, f64)| within(at, &x) && within(low, &y);
+    let band: Vec<&(f64, f64, f64)> = series.band.iter().filter(inside).collect();
+    let upper = band.iter().map(|(at, _, high)| (*at, high.min(y.end)));
+    let outline: Vec<(f64, f64)> = upper.chain(band.iter().rev().map(|(at, low, _)| (*at, *low))).collect();
     let shade = Polygon::new(outline, series.ink.colour().mix(0.16));
     chart.draw_series(std::iter::once(shade)).map_err(|error| error.to_string())?;
     Ok(())
@@ -236,11 +239,19 @@ fn line<B: DrawingBackend>(chart: &mut Chart<'_, B>, series: &Series, scale: u32
     Ok(())
 }
 
-/// The points without those that lie closer than a hair to the last one kept: dashes come out even.
+/// Whether a value lies on an axis; NaN does not.
+fn within(value: f64, range: &Range<f64>) -> bool {
+    let hair = 1e-6 * (range.end - range.start);
+    value >= range.start - hair && value <= range.end + hair
+}
+
+/// The points on the axes, without those that lie closer than a hair to the last one kept: dashes come out even.
 fn thinned(series: &Series, x: Range<f64>, y: Range<f64>) -> Vec<(f64, f64)> {
     const HAIR: f64 = 0.008;
     let mut kept: Vec<(f64, f64)> = Vec::new();
-    let finite = series.points.iter().copied().filter(|(px, py)| px.is_finite() && py.is_finite());
+    // Clamped to the edge, a point would be drawn where the curve is not.
+    let inside = |&(px, py): &(f64, f64)| within(px, &x) && within(py, &y);
+    let finite = series.points.iter().copied().filter(inside);
     let mut left_out = None;
     for point in finite {
         let far = |last: &(f64, f64)| {

@@ -137,15 +137,14 @@ impl Workshop {
             job.sets.iter().fold(String::new(), |all, set| all + " --set '" + set + "'")
         );
         let stamp = format!("{command}\ninput {:016x}\n", fingerprint(text));
-        let wall = match self.reuse.then(|| finished(&record, &stamp)).flatten() {
-            Some(wall) => wall,
-            None => {
-                let wall = self.launch(program, &config, job, &directory)?;
-                let text = format!("{stamp}wall {wall:.3} s\n");
-                write_atomically(&record, text.as_bytes()).map_err(|error| error.to_string())?;
-                wall
-            }
-        };
+        let kept = if self.reuse { finished(&record, &stamp) } else { None };
+        // A table of another version of the program cannot be read: the run is made anew.
+        if let Some(run) = kept.and_then(|wall| Some(Run { rows: history::read(&directory).ok()?, wall })) {
+            return Ok(run);
+        }
+        let wall = self.launch(program, &config, job, &directory)?;
+        write_atomically(&record, format!("{stamp}wall {wall:.3} s\n").as_bytes())
+            .map_err(|error| error.to_string())?;
         let rows = history::read(&directory).map_err(|error| error.to_string())?;
         Ok(Run { rows, wall })
     }

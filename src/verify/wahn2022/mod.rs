@@ -39,7 +39,7 @@ pub struct Wahn2022Options {
     /// Processes at a time; by itself one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     workers: Option<u16>,
-    /// Small packings of one seed, to try the command: Figs. 13 to 16 then show little.
+    /// Small packings of one seed, to try the command; single checks of Figs. 13 to 15 may fail then.
     #[arg(long)]
     quick: bool,
     /// Take over finished runs of the output folder that had the same input; only sensible with the same program.

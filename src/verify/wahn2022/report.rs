@@ -65,9 +65,9 @@ pub fn print(chapter: &Chapter) {
 pub fn write(folder: &Path, command: &str, chapters: &[Chapter], total: f64) -> Result<()> {
     let mut text = format!(
         "# Wahn, Gan, Kamlah 2022: what we reproduce, and how well\n\n\
-         Written by `{command}`, which makes every run, draws every picture and fills in every number below. W is\n\
-         *Viscoelastic behavior in discrete element method realized by interparticle Maxwell–Zener model*,\n\
-         doi:10.1142/S2424913022410053. Values over several packings stand as mean (least … most).\n\n"
+         Written by `{command}`, which makes every run, draws every picture and fills in\n\
+         every number below. W is *Viscoelastic behavior in discrete element method realized by interparticle\n\
+         Maxwell–Zener model*, doi:10.1142/S2424913022410053. Values over several packings stand as mean (least … most).\n\n"
     );
     let Count { passed, failed, findings } = count(chapters);
     let _ = writeln!(
