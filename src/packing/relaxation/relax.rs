@@ -38,9 +38,9 @@ pub struct Look {
 /// Forces per particle: on positions and on turns (per path).
 #[derive(Debug, Default)]
 struct Forces {
-    on_position: Vec<[f64; 3]>,
-    on_turn: Vec<[f64; 3]>,
-    on_cell: f64,
+    centres: Vec<[f64; 3]>,
+    turns: Vec<[f64; 3]>,
+    cell: f64,
 }
 
 /// When to stop.
@@ -111,10 +111,10 @@ impl System {
             self.list = PairList::new(&self.positions, &self.radii, self.sides, MARGIN);
         }
         let count = self.positions.len();
-        forces.on_position.clear();
-        forces.on_position.resize(count, [0.0; 3]);
-        forces.on_turn.clear();
-        forces.on_turn.resize(count, [0.0; 3]);
+        forces.centres.clear();
+        forces.centres.resize(count, [0.0; 3]);
+        forces.turns.clear();
+        forces.turns.resize(count, [0.0; 3]);
         let mut look = Look::default();
         for pair in &mut self.list.pairs {
             let (first, second) = (pair.first as usize, pair.second as usize);
@@ -127,10 +127,10 @@ impl System {
             pair.place = found.place;
             let depth = 1.0 - found.scale;
             for k in 0..3 {
-                forces.on_position[first][k] -= depth * found.gradient[k];
-                forces.on_position[second][k] += depth * found.gradient[k];
-                forces.on_turn[first][k] += depth * found.turn_first[k] / self.arms[first];
-                forces.on_turn[second][k] += depth * found.turn_second[k] / self.arms[second];
+                forces.centres[first][k] -= depth * found.gradient[k];
+                forces.centres[second][k] += depth * found.gradient[k];
+                forces.turns[first][k] += depth * found.turn_first[k] / self.arms[first];
+                forces.turns[second][k] += depth * found.turn_second[k] / self.arms[second];
             }
             look.overlaps += 1;
             look.depth += depth;
@@ -154,14 +154,14 @@ impl System {
         let count = self.positions.len();
         let weight = CELL_WEIGHT * (count as f64).sqrt();
         let (mut forces, mut motion) = (Forces::default(), Forces::default());
-        motion.on_position.resize(count, [0.0; 3]);
-        motion.on_turn.resize(count, [0.0; 3]);
+        motion.centres.resize(count, [0.0; 3]);
+        motion.turns.resize(count, [0.0; 3]);
         let (mut step, mut mixing, mut downhill) = (0.1, MIXING, 0);
         let mut look = Look::default();
         for _ in 0..goal.max_steps {
             look = self.look(&mut forces);
             let load = goal.pressure.map(|pressure| 3.0 * pressure * self.volume());
-            forces.on_cell = load.map_or(0.0, |load| (look.virial - load) / weight);
+            forces.cell = load.map_or(0.0, |load| (look.virial - load) / weight);
             if self.is_met(goal, &look, &forces, load) {
                 return (look, true);
             }
@@ -192,22 +192,22 @@ impl System {
         }
         let mean = 0.5 * look.depth / look.overlaps as f64;
         let sum = |list: &[[f64; 3]]| list.iter().flatten().map(|x| x * x).sum::<f64>();
-        let residual = ((sum(&forces.on_position) + sum(&forces.on_turn)) / self.positions.len() as f64).sqrt();
+        let residual = ((sum(&forces.centres) + sum(&forces.turns)) / self.positions.len() as f64).sqrt();
         residual <= goal.tolerance * mean && (look.virial / load - 1.0).abs() <= goal.tolerance
     }
 
     fn advance(&mut self, motion: &Forces, step: f64, weight: f64) {
         // However hard it is pressed, the box does not fold.
-        let stretch = 1.0 + (step * motion.on_cell / weight).clamp(-0.02, 0.02);
-        if motion.on_cell != 0.0 {
+        let stretch = 1.0 + (step * motion.cell / weight).clamp(-0.02, 0.02);
+        if motion.cell != 0.0 {
             self.stretch(stretch);
         }
         for (index, position) in self.positions.iter_mut().enumerate() {
-            for (x, speed) in position.iter_mut().zip(motion.on_position[index]) {
+            for (x, speed) in position.iter_mut().zip(motion.centres[index]) {
                 *x += step * speed;
             }
             let half = 0.5 * step / self.arms[index];
-            let [x, y, z] = motion.on_turn[index].map(|path| half * path);
+            let [x, y, z] = motion.turns[index].map(|path| half * path);
             let turned = product([1.0, x, y, z], self.orientations[index]);
             self.orientations[index] = normalised(turned);
         }
@@ -217,8 +217,8 @@ impl System {
 
 /// v·F, v·v and F·F over all coordinates.
 fn products(motion: &Forces, forces: &Forces) -> (f64, f64, f64) {
-    let lists = [(&motion.on_position, &forces.on_position), (&motion.on_turn, &forces.on_turn)];
-    let (v, f) = (motion.on_cell, forces.on_cell);
+    let lists = [(&motion.centres, &forces.centres), (&motion.turns, &forces.turns)];
+    let (v, f) = (motion.cell, forces.cell);
     let mut sums = (v * f, v * v, f * f);
     for (v, f) in lists.into_iter().flat_map(|(a, b)| a.iter().flatten().zip(b.iter().flatten())) {
         sums = (sums.0 + v * f, sums.1 + v * v, sums.2 + f * f);
@@ -228,9 +228,9 @@ fn products(motion: &Forces, forces: &Forces) -> (f64, f64, f64) {
 
 /// v ← keep · v + add · F.
 fn combine(motion: &mut Forces, keep: f64, forces: &Forces, add: f64) {
-    motion.on_cell = keep * motion.on_cell + add * forces.on_cell;
-    let positions = motion.on_position.iter_mut().flatten().zip(forces.on_position.iter().flatten());
-    let turns = motion.on_turn.iter_mut().flatten().zip(forces.on_turn.iter().flatten());
+    motion.cell = keep * motion.cell + add * forces.cell;
+    let positions = motion.centres.iter_mut().flatten().zip(forces.centres.iter().flatten());
+    let turns = motion.turns.iter_mut().flatten().zip(forces.turns.iter().flatten());
     for (v, f) in positions.chain(turns) {
         *v = keep * *v + add * f;
     }
