@@ -223,9 +223,9 @@ fn line<B: DrawingBackend>(chart: &mut Chart<'_, B>, series: &Series, scale: u32
         Style::Dashed | Style::Dotted => {
             let drawn = chart.draw_series(DashedLineSeries::new(points, dash, gap, pen)).map_err(text)?;
             if let Some(label) = listed {
-                drawn.label(label).legend(move |(x, y)| {
-                    DashedPathElement::new(vec![(x, y), (x + length, y)].into_iter(), dash, gap, pen)
-                });
+                drawn
+                    .label(label)
+                    .legend(move |(x, y)| DashedPathElement::new([(x, y), (x + length, y)], dash, gap, pen));
             }
         }
         Style::Marks => {

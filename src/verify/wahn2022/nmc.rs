@@ -72,10 +72,10 @@ pub fn judge(runs: &Runs, extent: &Extent) -> Judged<Judgement> {
         share("BC off BCT at 1 % strain (W: about 3 %)", &magnitudes(&differences(&bc, &bct, AT))),
         share("W: MZ over 10 s off quasi-static HSD at 1 % strain", &off(&mz[0])).or_finding(
             "Cannot hold with W's constants: τ = η/E_1 = 5.95 s is as long as the loading, so each contact alone is \
-             15.9 % above its long-term spring after 10 s (next lines).",
+             16.5 % above its long-term spring after 10 s (next lines).",
         ),
         Check::within(
-            "MZ over 10 s above quasi-static HSD at 1 % strain (one contact: 15.9 %)",
+            "MZ over 10 s above quasi-static HSD at 1 % strain (one contact: 16.5 %)",
             [0.14, 0.20],
             Unit::Percent,
             &differences(&mz[0], &fixed, AT),

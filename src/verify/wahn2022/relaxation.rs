@@ -111,6 +111,6 @@ fn hold(all: &Packings, mz: &[Points]) -> Judged<Series> {
     let [loaded, held] = TIMES.map(|time| spread(mz, &[time]));
     line.points.retain(|point| point.0 < 0.999 * AT);
     line.band.retain(|point| point.0 < 0.999 * AT);
-    line.points.extend([&loaded, &held].iter().flat_map(|end| end.mean.first()).map(|point| (AT, point.1)));
+    line.points.extend([&loaded, &held].iter().filter_map(|end| end.mean.first()).map(|point| (AT, point.1)));
     Ok(line)
 }
