@@ -14,7 +14,7 @@ use std::{env, fs};
 const PAGE: &str = "docs/adding_a_law.md";
 
 /// What the build and the commands of the page need.
-const COPIED: &[&str] = &["Cargo.toml", "Cargo.lock", "src", "tests/data", "configs"];
+const COPIED: &[&str] = &["Cargo.toml", "Cargo.lock", "src", "tests/data", "configs", "benches"];
 
 /// A fenced block of the page.
 #[derive(Debug)]

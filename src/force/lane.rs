@@ -80,7 +80,7 @@ pub trait Lane:
 pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
     #[cfg(target_arch = "x86_64")]
     for offset in (0..count * size_of::<T>()).step_by(64) {
-        avx2::prefetch_at(values.as_ptr().wrapping_add(index).cast::<i8>().wrapping_add(offset));
+        avx2::prefetch_at(values.as_ptr().wrapping_add(index).addr() + offset);
     }
 }
 

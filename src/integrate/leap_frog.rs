@@ -283,8 +283,7 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
         let squared = squares[0] + squares[1] + squares[2];
-        // Written so that NaN comes through.
-        if !(squared <= result.max_displacement_squared) {
+        if squared > result.max_displacement_squared || squared.is_nan() {
             result.take_displacement(squared, (slice.start + index) as u32);
         }
     }

@@ -64,6 +64,8 @@ pub fn worst_overlap(balls: &[Ball], ids: &[u32], own: usize, cell: &Cell, floor
             let d = image.separation(ball, partner);
             let distance = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
             let fraction = (ball.radius + partner.radius - distance) / ball.radius.min(partner.radius);
+            // So that copies of a packing tie, from wherever they are seen.
+            let fraction = (fraction * 1e12).round() * 1e-12;
             let pair = [ids[index].min(ids[other]), ids[index].max(ids[other])];
             if fraction > worst.fraction || (fraction == worst.fraction && fraction > floor && pair < worst.ids) {
                 worst = Worst { ids: pair, fraction };

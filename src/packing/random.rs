@@ -17,11 +17,11 @@ pub enum Purpose {
     /// Displacements of a replicated packing.
     Perturbation = 4,
     /// Ratios of semi-axes.
-    Shape = 5,
+    Shape = 7,
     /// Initial orientations.
     Orientation = 6,
     /// The order in which spheres are dropped.
-    DropOrder = 7,
+    DropOrder = 5,
 }
 
 /// The sequence of random numbers of one particle for one purpose.

@@ -123,18 +123,17 @@ impl Phase<'_> {
         let values = &mut bytemuck::cast_slice_mut(&mut lines.kept)[..*kept * lines.stride];
         let (low, high) = (partners[0] as usize - 1, partners[partners.len() - 1] as usize);
         let work = Work { strips, sections, first_section: 0 };
-        self.kept_strips(work, &mut lines.rings, runs, low * *pairs..high * *pairs, 3 * *pairs, bodies, values)
+        self.kept_strips(work, (&mut lines.rings, values), runs, low * *pairs..high * *pairs, 3 * *pairs, bodies)
     }
 
     fn kept_strips(
         &self,
         work: Work,
-        rings: &mut [Ring],
+        (rings, lines): (&mut [Ring], &mut [f64]),
         runs: &[Run],
         wanted: Range<usize>,
         per_strip: usize,
         bodies: BodyData,
-        lines: &mut [f64],
     ) -> Option<PassFault> {
         let [strip] = work.strips else {
             if work.strips.is_empty() {
@@ -147,8 +146,8 @@ impl Phase<'_> {
             let (low_runs, high_runs) = runs.split_at(low.strips.len() * per_strip);
             let (low_rings, high_rings) = rings.split_at_mut(low.strips.len());
             let (a, b) = rayon::join(
-                || self.kept_strips(low, low_rings, low_runs, wanted.clone(), per_strip, bodies, low_lines),
-                || self.kept_strips(high, high_rings, high_runs, wanted.clone(), per_strip, bodies, high_lines),
+                || self.kept_strips(low, (low_rings, low_lines), low_runs, wanted.clone(), per_strip, bodies),
+                || self.kept_strips(high, (high_rings, high_lines), high_runs, wanted.clone(), per_strip, bodies),
             );
             return a.or(b);
         };

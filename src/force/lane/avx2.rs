@@ -80,9 +80,9 @@ pub fn address(records: &[Record], index: u32) -> *const f64 {
 
 /// Ask for the cache line at an address.
 #[inline(always)]
-pub fn prefetch_at(address: *const i8) {
+pub fn prefetch_at(address: usize) {
     // SAFETY: a prefetch is a hint that every x86-64 processor knows; it never faults, whatever the address.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::without_provenance(address)) };
 }
 
 impl Lane for F64x4 {
