@@ -158,7 +158,7 @@ pub fn conservation() -> Result<Vec<Claim>> {
 }
 
 /// Two equal spheres that rub and roll, alone and in a run with an ellipsoid far away, where every contact goes
-/// through the geometry of ellipsoids.
+/// through the pass of ellipsoids.
 pub fn spheres() -> Result<Vec<Claim>> {
     const RADIUS: f64 = 1e-3;
     let material = format!("{MATERIAL}\nfriction = 0.4\nrolling_friction = 0.1\ntwisting_friction = 0.1");

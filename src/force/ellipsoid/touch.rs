@@ -1,11 +1,12 @@
-//! Touches of ellipsoids, a block at a time, from packed records and shapes. The block's numbers are laid down in
+//! Touches where there are ellipsoids, a block at a time, from packed records and shapes; blocks of spheres alone
+//! need no search for the common normal. The block's numbers are laid down in
 //! between so that this code is compiled once per instruction set and not once per law.
 
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, Found};
 use super::{radii_tensor, shape_tensor, support, tangents};
 use crate::contact::section::{BLOCK, Section};
-use crate::force::geometry::{Bodies, CellMotion, PairTouch, TOUCH_TOLERANCE, image};
+use crate::force::geometry::{self, Bodies, CellMotion, PairTouch, TOUCH_TOLERANCE, image};
 use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
@@ -116,9 +117,18 @@ impl Source<'_> {
         let b = Bodies::<L>::gather(self.records, second);
         let shape_a = gather_shapes(self.shapes, first);
         let shape_b = gather_shapes(self.shapes, second);
+        let codes = &self.section.shift[lanes];
+        let between_spheres = EllipsoidTouch::of_spheres(geometry::spheres(&a, &b, codes, self.surroundings.motion));
+        let round: L::Mask = shape_a.is_sphere() & shape_b.is_sphere();
+        if !L::any(!round) {
+            return between_spheres;
+        }
         let memory = self.block * self.section.columns + self.normals;
         let stored = [0, 1, 2].map(|k| L::load(&self.section.memory[memory + k].0[lane..]));
-        ellipsoids([&a, &b], [&shape_a, &shape_b], stored, &self.section.shift[lanes], self.surroundings)
+        let touch = ellipsoids([&a, &b], [&shape_a, &shape_b], stored, codes, self.surroundings);
+        // By lane and not by block: a pair's bits must not hang on the pairs beside it.
+        let (round_numbers, numbers) = (between_spheres.numbers(), touch.numbers());
+        EllipsoidTouch::from_numbers(std::array::from_fn(|k| L::select(round, round_numbers[k], numbers[k])))
     }
 }
 
@@ -148,6 +158,13 @@ impl<L: Lane> Shapes<L> {
     #[inline(always)]
     fn smallest(&self) -> L {
         self.semi_axes[0].min(self.semi_axes[1]).min(self.semi_axes[2])
+    }
+
+    /// All semi-axes are equal.
+    #[inline(always)]
+    fn is_sphere(&self) -> L::Mask {
+        let [a, b, c] = self.semi_axes;
+        a.at_least(b) & b.at_least(a) & b.at_least(c) & c.at_least(b)
     }
 
     /// r̂, the radius of the sphere of equal volume \[m\].
@@ -220,8 +237,7 @@ pub fn ellipsoids<L: Lane>(
 #[must_use]
 pub fn wall(a: &Record, shape: &Shape, wall: u32, motion: &CellMotion) -> EllipsoidTouch<f64> {
     // What of the wall does not depend on the shape.
-    let PairTouch { touch: plane, branch, imposed_velocity, arm_first: gap, .. } =
-        crate::force::geometry::wall(a, wall, motion);
+    let PairTouch { touch: plane, branch, imposed_velocity, arm_first: gap, .. } = geometry::wall(a, wall, motion);
     let normal = plane.normal;
     let tensor = shape_tensor(shape.semi_axes, shape.orientation);
     let (height, point) = support(&tensor, normal);
@@ -255,6 +271,13 @@ pub fn wall(a: &Record, shape: &Shape, wall: u32, motion: &CellMotion) -> Ellips
 }
 
 impl<L: Lane> EllipsoidTouch<L> {
+    /// Two spheres as a pair of this kind.
+    #[inline(always)]
+    fn of_spheres(pair: PairTouch<L>) -> Self {
+        let normal = pair.touch.normal;
+        Self { pair, arms: [scale(normal, pair.arm_first), scale(normal, -pair.arm_second)] }
+    }
+
     #[inline(always)]
     fn numbers(&self) -> [L; NUMBERS] {
         let PairTouch { touching, touch: t, branch, imposed_velocity: v, arm_first, arm_second, min_radius } =
