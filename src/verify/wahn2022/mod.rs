@@ -5,6 +5,7 @@
 mod assembly;
 pub(super) mod check;
 mod curves;
+mod density;
 mod job;
 mod loose;
 mod nmc;
@@ -123,7 +124,7 @@ const FIGURES: &[Figure] = &[
         setting: "Random close packings of 0.635, 0.5 % (BCT), input `configs/wahn2022/fig15.toml`. First with strain rate \
                   squared times\ndensity scaling at 10⁴ s⁻², between *dynamic elastic* runs of the same kinematics, at \
                   W's rates and slower ones\ndown to the soft limit; then with W's own inertia (10⁶ to 10⁸ s⁻², no dashpot \
-                  beside the branch), each beside the\nelastic run with the same inertia.",
+                  beside the branch), each beside the\nelastic run with the same inertia; last, at 1 /s, the physical density itself.",
         plan: rates::plan,
         judge: rates::judge,
     },

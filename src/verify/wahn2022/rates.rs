@@ -6,7 +6,7 @@ use super::assembly::{
 use super::check::{Check, Unit};
 use super::curves::{PVDF, Points, grid, highest, sample, spread};
 use super::job::{Job, Runs};
-use super::{Extent, Judged, Judgement};
+use super::{Extent, Judged, Judgement, density};
 use crate::output::plot::{Corner, Ink, Panel, Series, Style};
 
 const FIGURE: u32 = 15;
@@ -56,7 +56,7 @@ fn variants() -> Vec<Variant> {
 
 /// Runs of Fig. 15.
 pub fn plan(extent: &Extent) -> Vec<Job> {
-    jobs(FIGURE, &variants(), extent)
+    [jobs(FIGURE, &variants(), extent), density::plan(FIGURE, extent)].concat()
 }
 
 /// How far MZ leaves the range between its elastic companions, over the lower one, from 0.1 % strain on.
@@ -103,8 +103,14 @@ impl Curves {
 /// Fig. 15.
 pub fn judge(runs: &Runs, extent: &Extent) -> Judged<Judgement> {
     let curves = Curves::of(&Packings { figure: FIGURE, runs, seeds: &extent.seeds })?;
-    let checks = [little_inertia(&curves), own_inertia(&curves)].concat();
-    Ok(Judgement { checks, panels: panels(&curves, extent) })
+    let mut checks = [little_inertia(&curves), own_inertia(&curves)].concat();
+    let mut panels = panels(&curves, extent);
+    if !extent.quick {
+        let (of_density, panel) = density::judge(FIGURE, runs, "mz-1", extent)?;
+        checks.extend(of_density);
+        panels.push(("fig15density".to_owned(), panel));
+    }
+    Ok(Judgement { checks, panels })
 }
 
 /// MZ over its elastic companions, over the theory of one contact, at the end.
