@@ -26,7 +26,7 @@ impl<L: Lane> Ellipse<L> {
     #[inline(always)]
     #[must_use]
     pub fn new(radii: &[[L; 3]; 2]) -> Self {
-        let [a, b] = radii.map(|w| inverse(&w));
+        let (a, b) = (inverse(&radii[0]), inverse(&radii[1]));
         Self::of_curvatures([a[0] + b[0], a[1] + b[1], a[2] + b[2]])
     }
 
@@ -46,10 +46,12 @@ impl<L: Lane> Ellipse<L> {
         let determinant = sum[0] * sum[1] - sum[2] * sum[2];
         // 4 A B is the determinant; the larger eigenvalue suffers no cancellation. Rounding must not make B < A.
         let ratio = one.max(larger * larger / determinant);
+        // Powers by way of logarithms: one of them for both factors, and no digits lost in the "−1".
+        let log = ratio.map(libm::log);
         let factor = |inner: f64, outer: f64| {
-            ratio.map(move |q| {
-                let excess = libm::pow(q, inner) - 1.0;
-                if excess > 0.0 { 1.0 - libm::pow(excess, outer) } else { 1.0 - excess }
+            log.map(move |log| {
+                let excess = libm::expm1(inner * log);
+                if excess > 0.0 { 1.0 - libm::exp(outer * libm::log(excess)) } else { 1.0 - excess }
             })
         };
         Self {

@@ -27,13 +27,15 @@ pub fn shape_tensor<L: Lane>(semi_axes: Vector<L>, orientation: [L; 4]) -> Symme
         [two * (x * y - w * z), one - two * (x * x + z * z), two * (y * z + w * x)],
         [two * (x * z + w * y), two * (y * z - w * x), one - two * (x * x + y * y)],
     ];
-    let squares = semi_axes.map(|a| a * a);
-    let entry = |i: usize, k: usize| {
-        squares[0] * columns[0][i] * columns[0][k]
+    let [a, b, c] = semi_axes;
+    let squares = [a * a, b * b, c * c];
+    let mut entries = [L::splat(0.0); 6];
+    for (entry, (i, k)) in entries.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
+        *entry = squares[0] * columns[0][i] * columns[0][k]
             + squares[1] * columns[1][i] * columns[1][k]
-            + squares[2] * columns[2][i] * columns[2][k]
-    };
-    [entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)]
+            + squares[2] * columns[2][i] * columns[2][k];
+    }
+    entries
 }
 
 /// `M = R² I` of a sphere.
@@ -62,7 +64,7 @@ pub fn support<L: Lane>(m: &Symmetric<L>, n: Vector<L>) -> (L, Vector<L>) {
     let image = apply(m, n);
     let distance = dot(n, image).sqrt();
     let inverse = L::splat(1.0) / distance;
-    (distance, image.map(|c| c * inverse))
+    (distance, [image[0] * inverse, image[1] * inverse, image[2] * inverse])
 }
 
 /// Two unit vectors orthogonal to the unit vector n and to each other, smooth but where n_z changes sign.

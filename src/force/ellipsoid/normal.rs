@@ -65,7 +65,7 @@ impl<L: Lane> Ellipsoids<L> {
             normal,
             overlap: first_distance + second_distance - dot(normal, self.branch),
             first_point,
-            second_point: opposite.map(|c| -c),
+            second_point: [-opposite[0], -opposite[1], -opposite[2]],
             tangents,
             radii: [
                 radii_tensor(a, first_distance, first_point, &tangents),
@@ -124,7 +124,7 @@ impl<L: Lane> Ellipsoids<L> {
     pub fn common_normal(&self, stored: Vector<L>, bound: L) -> Search<L> {
         let warm = dot(stored, stored).greater(L::splat(0.5));
         let straight = unit(self.branch);
-        let start = [0, 1, 2].map(|k| L::select(warm, stored[k], straight[k]));
+        let start = choose(warm, &stored, &straight);
         let mut first = self.search(start, bound);
         let again = !warm & first.found.overlap.greater(bound);
         if L::any(again) {
@@ -142,8 +142,8 @@ impl<L: Lane> Ellipsoids<L> {
     #[inline(always)]
     fn pulled_back(&self) -> Vector<L> {
         let [a, b] = &self.tensors;
-        let m: Symmetric<L> = std::array::from_fn(|k| a[k] + b[k]);
-        let [xx, yy, zz, xy, xz, yz] = m;
+        let [xx, yy, zz] = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+        let [xy, xz, yz] = [a[3] + b[3], a[4] + b[4], a[5] + b[5]];
         let adjugate = [
             yy * zz - yz * yz,
             xx * zz - xz * xz,
@@ -194,19 +194,15 @@ impl<L: Lane> Step<L> {
         let stiff = [L::select(round, one, raw[0] * inverse), L::select(round, zero, raw[1] * inverse)];
         let soft = [-stiff[1], stiff[0]];
         let (high, low) = (mean + radius, mean - radius);
-        let magnitude = |x: L| x.max(-x);
         let stiffness = magnitude(high).max(magnitude(low));
         // A curvature of nearly nothing must not throw the step off the sphere.
         let floor = L::splat(1e-9) * stiffness;
-        let component = |direction: [L; 2], curvature: L| {
-            let slope = direction[0] * gradient[0] + direction[1] * gradient[1];
-            let newton = -slope / (magnitude(curvature).max(floor) + damping);
-            // At a maximum the slope may be zero: leave it all the same, by less the more often it failed.
-            let kick = L::splat(KICK) * stiffness / (stiffness + L::splat(10.0) * damping);
-            let kicked = L::select(slope.greater(zero), newton.min(-kick), newton.max(kick));
-            (slope, L::select(curvature.less(zero), kicked, newton))
-        };
-        let ((soft_slope, soft_step), (stiff_slope, stiff_step)) = (component(soft, low), component(stiff, high));
+        // At a maximum the slope may be zero: leave it all the same, by less the more often it failed.
+        let kick = L::splat(KICK) * stiffness / (stiffness + L::splat(10.0) * damping);
+        let slope = |direction: [L; 2]| direction[0] * gradient[0] + direction[1] * gradient[1];
+        let (soft_slope, stiff_slope) = (slope(soft), slope(stiff));
+        let soft_step = along_one(soft_slope, low, magnitude(low).max(floor) + damping, kick);
+        let stiff_step = along_one(stiff_slope, high, magnitude(high).max(floor) + damping, kick);
         let length = (soft_step * soft_step + stiff_step * stiff_step).sqrt();
         let factor = one.min(L::splat(LONGEST_STEP) / length);
         let (soft_step, stiff_step) = (soft_step * factor, stiff_step * factor);
@@ -220,22 +216,40 @@ impl<L: Lane> Step<L> {
     }
 }
 
+#[inline(always)]
+fn magnitude<L: Lane>(x: L) -> L {
+    x.max(-x)
+}
+
+/// The step in one principal direction: Newton's, at least `kick` where the curvature is negative.
+#[inline(always)]
+fn along_one<L: Lane>(slope: L, curvature: L, resistance: L, kick: L) -> L {
+    let zero = L::splat(0.0);
+    let newton = -slope / resistance;
+    let kicked = L::select(slope.greater(zero), newton.min(-kick), newton.max(kick));
+    L::select(curvature.less(zero), kicked, newton)
+}
+
+// Functions and not closures: these are inlined wherever they stand, and with them the vector instructions.
+#[inline(always)]
+fn choose<L: Lane>(mask: L::Mask, yes: &[L; 3], no: &[L; 3]) -> [L; 3] {
+    [L::select(mask, yes[0], no[0]), L::select(mask, yes[1], no[1]), L::select(mask, yes[2], no[2])]
+}
+
 impl<L: Lane> Found<L> {
     /// Lane by lane `yes` or `no`.
     #[inline(always)]
     #[must_use]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
-        let choose = |a: L, b: L| L::select(mask, a, b);
-        fn zip<L: Lane, const N: usize>(a: [L; N], b: [L; N], f: impl Fn(L, L) -> L) -> [L; N] {
-            std::array::from_fn(|k| f(a[k], b[k]))
-        }
+        let [a, b] = [&yes.tangents, &no.tangents];
+        let [r, s] = [&yes.radii, &no.radii];
         Self {
-            normal: zip(yes.normal, no.normal, choose),
-            overlap: choose(yes.overlap, no.overlap),
-            first_point: zip(yes.first_point, no.first_point, choose),
-            second_point: zip(yes.second_point, no.second_point, choose),
-            tangents: [0, 1].map(|k| zip(yes.tangents[k], no.tangents[k], choose)),
-            radii: [0, 1].map(|k| zip(yes.radii[k], no.radii[k], choose)),
+            normal: choose(mask, &yes.normal, &no.normal),
+            overlap: L::select(mask, yes.overlap, no.overlap),
+            first_point: choose(mask, &yes.first_point, &no.first_point),
+            second_point: choose(mask, &yes.second_point, &no.second_point),
+            tangents: [choose(mask, &a[0], &b[0]), choose(mask, &a[1], &b[1])],
+            radii: [choose(mask, &r[0], &s[0]), choose(mask, &r[1], &s[1])],
         }
     }
 }

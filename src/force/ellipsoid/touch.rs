@@ -93,7 +93,11 @@ impl TouchBlock {
     #[inline(always)]
     #[must_use]
     pub fn load<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
-        EllipsoidTouch::from_numbers(std::array::from_fn(|k| L::load(&self.0[k][lane..])))
+        let mut numbers = [L::splat(0.0); NUMBERS];
+        for (number, column) in numbers.iter_mut().zip(&self.0) {
+            *number = L::load(&column[lane..]);
+        }
+        EllipsoidTouch::from_numbers(numbers)
     }
 }
 
@@ -127,8 +131,11 @@ impl Source<'_> {
         let stored = [0, 1, 2].map(|k| L::load(&self.section.memory[memory + k].0[lane..]));
         let touch = ellipsoids([&a, &b], [&shape_a, &shape_b], stored, codes, self.surroundings);
         // By lane and not by block: a pair's bits must not hang on the pairs beside it.
-        let (round_numbers, numbers) = (between_spheres.numbers(), touch.numbers());
-        EllipsoidTouch::from_numbers(std::array::from_fn(|k| L::select(round, round_numbers[k], numbers[k])))
+        let mut numbers = touch.numbers();
+        for (number, of_spheres) in numbers.iter_mut().zip(between_spheres.numbers()) {
+            *number = L::select(round, of_spheres, *number);
+        }
+        EllipsoidTouch::from_numbers(numbers)
     }
 }
 
@@ -150,7 +157,10 @@ fn gather_shapes<L: Lane>(shapes: &[Shape], index: &[u32]) -> Shapes<L> {
             column[lane] = *number;
         }
     }
-    let lanes = columns.map(|column| L::load(&column));
+    let mut lanes = [L::splat(0.0); 7];
+    for (lane, column) in lanes.iter_mut().zip(&columns) {
+        *lane = L::load(column);
+    }
     Shapes { semi_axes: [lanes[0], lanes[1], lanes[2]], orientation: [lanes[3], lanes[4], lanes[5], lanes[6]] }
 }
 
@@ -192,7 +202,8 @@ pub fn ellipsoids<L: Lane>(
     let motion = surroundings.motion;
     let branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
     let min_radius = shapes[0].smallest().min(shapes[1].smallest());
-    let tensors = shapes.map(|shape| shape_tensor(shape.semi_axes, shape.orientation));
+    let [one, other] = shapes;
+    let tensors = [shape_tensor(one.semi_axes, one.orientation), shape_tensor(other.semi_axes, other.orientation)];
     let bound = L::splat(-surroundings.range) * min_radius;
     let found: Found<L> = Ellipsoids { tensors, branch }.common_normal(stored, bound).found;
     let (normal, overlap) = (found.normal, found.overlap);
