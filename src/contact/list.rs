@@ -43,6 +43,8 @@ pub struct Strip {
     pub first_line: usize,
     /// Lines that the ring must hold, a power of two.
     pub ring: usize,
+    /// For each chunk how many of its particles have near contacts only.
+    pub near_only: Vec<u8>,
 }
 
 impl Strip {
@@ -106,6 +108,10 @@ pub struct ContactList {
     pub offsets: Vec<u32>,
     /// Ends of all particles.
     pub ends: Vec<End>,
+    /// For each owned particle a place within its chunk: the order in which the chunk's particles are summed up. Those
+    /// with near contacts only come first; each kind goes by the number of contacts, so that the processor foresees how
+    /// often the loop over them runs.
+    pub summing: Vec<u8>,
 }
 
 impl ContactList {
@@ -121,7 +127,8 @@ impl ContactList {
                 self.sections.extend(sections.map(|(pair, columns)| Section::new(pair, partners, *columns, origin)));
             }
         }
-        let strip = |particles| Strip { particles, near: 0..0, kept: 0..0, first_line: 0, ring: BLOCK };
+        let strip =
+            |particles| Strip { particles, near: 0..0, kept: 0..0, first_line: 0, ring: BLOCK, near_only: Vec::new() };
         self.strips = strips.into_iter().map(strip).collect();
     }
 
@@ -185,6 +192,7 @@ impl ContactList {
     pub fn index(&mut self, particles: &Particles, total: u32) {
         self.number_lines();
         self.order_ends(particles, total);
+        self.order_sums();
     }
 
     fn number_lines(&mut self) {
@@ -226,6 +234,21 @@ impl ContactList {
             strip.ring = ring_of(strip, &runs[strip.near.clone()], near, number * per_strip, line);
         }
         self.lines = line;
+    }
+
+    fn order_sums(&mut self) {
+        let Self { strips, offsets, ends, kept, summing, .. } = self;
+        summing.resize(strips.last().map_or(0, |strip| strip.particles.end), 0);
+        for strip in strips {
+            let particles = &offsets[strip.particles.start..=strip.particles.end];
+            let chunks = summing[strip.particles.clone()].chunks_mut(CHUNK).enumerate();
+            let chunks = chunks.map(|(chunk, summing)| {
+                let start = chunk * CHUNK;
+                order_chunk(&particles[start..=start + summing.len()], ends, *kept, summing)
+            });
+            strip.near_only.clear();
+            strip.near_only.extend(chunks);
+        }
     }
 
     fn order_ends(&mut self, particles: &Particles, total: u32) {
@@ -274,6 +297,25 @@ impl ContactList {
     }
 }
 
+/// See [`ContactList::summing`]; gives how many particles have near contacts only.
+fn order_chunk(offsets: &[u32], ends: &[End], kept: usize, summing: &mut [u8]) -> u8 {
+    const KEPT: u16 = 1 << 15;
+    const PLACES: u16 = CHUNK as u16 - 1;
+    let mut keys = [0; CHUNK];
+    for (place, bounds) in offsets.windows(2).enumerate() {
+        let ends = &ends[bounds[0] as usize..bounds[1] as usize];
+        let has_kept = ends.iter().any(|end| end.line() < kept);
+        let count = ends.len().min(usize::from(KEPT / CHUNK as u16) - 1);
+        keys[place] = if has_kept { KEPT } else { 0 } | (count * CHUNK + place) as u16;
+    }
+    let keys = &mut keys[..summing.len()];
+    keys.sort_unstable();
+    for (slot, key) in summing.iter_mut().zip(&*keys) {
+        *slot = (key & PLACES) as u8;
+    }
+    keys.partition_point(|key| *key < KEPT) as u8
+}
+
 /// Sort the ends of each particle by their keys, on all threads.
 fn sort_ends(offsets: &[u32], keyed: &mut [(u64, End)], ends: &mut [End]) {
     const GRAIN: usize = 4096;
@@ -300,7 +342,7 @@ fn sort_ends(offsets: &[u32], keyed: &mut [(u64, End)], ends: &mut [End]) {
 
 /// Owner of a near contact, counted from the start of its strip.
 fn owner(section: &Section, place: usize) -> usize {
-    section.first[place].min(section.second[place]) as usize
+    section.first_of(place).min(section.second_of(place)) - section.origin
 }
 
 /// Lines that must be there together: from a contact's own to the last one evaluated before the particle
@@ -313,7 +355,7 @@ fn ring_of(strip: &Strip, runs: &[Run], near: &[Section], first_section: usize, 
             let section = &near[run.section as usize - first_section];
             let places = run.block as usize * BLOCK..((run.block + run.blocks) as usize * BLOCK).min(section.count);
             places.map(move |place| {
-                let other = section.first[place].max(section.second[place]) as usize;
+                let other = section.first_of(place).max(section.second_of(place)) - section.origin;
                 let line = run.line as usize + (place / BLOCK - run.block as usize) * BLOCK;
                 reached(other / CHUNK) - line
             })

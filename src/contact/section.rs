@@ -1,6 +1,7 @@
 //! Contacts of one pair of materials in blocks, with their memory.
 
 use super::shift;
+use crate::state::particles::RECORD;
 use bytemuck::{Pod, Zeroable};
 
 /// Contacts per block: the widest lanes.
@@ -40,9 +41,10 @@ pub struct Section {
     pub count: usize,
     /// Local index that the entries of `first` and `second` count from.
     pub origin: usize,
-    /// The particle with the lower global id.
+    /// The particle with the lower global id: its index times [`RECORD`], where its record begins in the array of
+    /// numbers, so that the contact pass has nothing to compute.
     pub first: Vec<u32>,
-    /// The other particle (or the wall, without origin).
+    /// The other particle likewise (or the number of the wall).
     pub second: Vec<u32>,
     /// Packed image shift of the second.
     pub shift: Vec<u16>,
@@ -78,13 +80,13 @@ impl Section {
     /// Local index of the first particle of a contact.
     #[must_use]
     pub fn first_of(&self, place: usize) -> usize {
-        self.origin + self.first[place] as usize
+        self.origin + self.first[place] as usize / RECORD
     }
 
     /// Local index of the second particle of a contact (not of a wall).
     #[must_use]
     pub fn second_of(&self, place: usize) -> usize {
-        self.origin + self.second[place] as usize
+        self.origin + self.second[place] as usize / RECORD
     }
 
     /// Set the number of contacts. New places hold padding and zero memory; so do the places that were cut
@@ -103,10 +105,11 @@ impl Section {
         }
     }
 
-    /// Make `place` a contact with zero memory.
+    /// Make `place` a contact with zero memory; indices from the origin on, or the number of the wall.
     pub fn set(&mut self, place: usize, first: u32, second: u32, code: u16) {
-        self.first[place] = first;
-        self.second[place] = second;
+        let unit = RECORD as u32;
+        self.first[place] = first * unit;
+        self.second[place] = if self.partners == Partners::Wall { second } else { second * unit };
         self.shift[place] = code;
         let start = place / BLOCK * self.columns;
         for line in &mut self.memory[start..start + self.columns] {
@@ -158,7 +161,7 @@ mod tests {
         section.resize(3);
         let mut row = [0.0; 2];
         section.read_memory(2, &mut row);
-        assert_eq!((section.first[2], row), (9, [9.0, -1.0]));
+        assert_eq!((section.first_of(2), section.second_of(2), row), (9, 20, [9.0, -1.0]));
         assert_eq!((section.blocks(), section.memory.len(), section.first[3]), (1, 2, 0));
         section.read_memory(3, &mut row);
         assert_eq!(row, [0.0; 2]);

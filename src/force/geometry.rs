@@ -1,9 +1,9 @@
 //! Geometry and relative motion of touching spheres and walls, from packed records.
 
-use super::lane::{Lane, RECORD, Vector, add, cross, dot, scale, sub};
+use super::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
 use crate::contact::shift::{self, ShiftTable};
-use crate::state::particles::Record;
+use crate::state::particles::{RECORD, Record};
 
 /// A contact exists where δ exceeds this fraction of R_i + R_j: image pairs that just touch (W Fig. 8)
 /// sit at δ = 0 up to rounding and must not flicker.
@@ -42,11 +42,11 @@ pub struct Bodies<L> {
 }
 
 impl<L: Lane> Bodies<L> {
-    /// The records of the first `L::WIDTH` indices.
+    /// The records at the first `L::WIDTH` offsets.
     #[inline(always)]
     #[must_use]
-    pub fn gather(records: &[Record], index: &[u32]) -> Self {
-        let c: [L; RECORD] = L::gather(records, index);
+    pub fn gather(records: &[Record], offsets: &[u32]) -> Self {
+        let c: [L; RECORD] = L::gather(records, offsets);
         Self {
             position: [c[0], c[1], c[2]],
             radius: c[3],
@@ -92,16 +92,26 @@ pub struct Relative<L> {
     pub velocity: Vector<L>,
     /// The part of it that the cell's motion imposes \[m/s\].
     pub imposed_velocity: Vector<L>,
-    /// Velocity of the two surfaces by their spins, `R_i ω_i + R_j ω_j` \[m/s\].
-    pub rim_velocity: Vector<L>,
     /// ω_i + ω_j \[rad/s\].
     pub spin_sum: Vector<L>,
-    /// ω_j − ω_i \[rad/s\].
+    /// ω_j − ω_i \[rad/s\]; not set by [`relative`].
     pub relative_spin: Vector<L>,
-    /// R_i and R_j \[m\].
-    pub radii: [L; 2],
+    /// R_j − R_i \[m\].
+    pub radius_difference: L,
+    /// R_i + R_j \[m\].
+    pub radius_sum: L,
     /// 1/m_i + 1/m_j \[1/kg\].
     pub inverse_masses: L,
+}
+
+impl<L: Lane> Relative<L> {
+    /// Pairs of unequal radii.
+    #[inline(always)]
+    #[must_use]
+    pub fn unequal(&self) -> L::Mask {
+        let zero = L::splat(0.0);
+        self.radius_difference.greater(zero) | zero.greater(self.radius_difference)
+    }
 }
 
 impl<L: Lane> PairTouch<L> {
@@ -119,82 +129,98 @@ impl<L: Lane> PairTouch<L> {
     }
 }
 
-/// Spheres a and b, b in the image of its packed shift.
+/// Some pairs of spheres at these offsets, the second ones in the images of their packed shifts; without
+/// `relative_spin`, which between equal spheres only rolling laws need.
 ///
 /// # Source
 /// PHYSICS.md section 1.
 #[inline(always)]
 #[must_use]
-pub fn relative<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> Relative<L> {
-    let mut branch = sub(b.position, a.position);
-    let mut imposed_velocity = [L::splat(0.0); 3];
-    // Away from periodic faces there is nothing to look up. (x + 0) − y and x − y are the same: no position is −0.
+pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
+    let zero = L::splat(0.0);
+    let (mut image_shift, mut imposed_velocity) = ([zero; 3], [zero; 3]);
+    // Away from periodic faces there is nothing to look up.
     if !shift::all_here(codes) {
-        branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
+        image_shift = image(&motion.shift, codes);
         if motion.faces_move {
             imposed_velocity = image(&motion.shift_velocity, codes);
         }
     }
+    let [[x, y, z, radius_difference], [vx, vy, vz, inverse_masses], [wx, wy, wz, radius_sum]] =
+        L::relative(records, pairs);
+    let branch = add([x, y, z], image_shift);
     let [gx, gy, gz] = motion.gradient;
     let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
     imposed_velocity = add(imposed_velocity, affine);
     Relative {
         branch,
-        velocity: add(sub(b.velocity, a.velocity), imposed_velocity),
+        velocity: add([vx, vy, vz], imposed_velocity),
         imposed_velocity,
-        rim_velocity: add(scale(a.spin, a.radius), scale(b.spin, b.radius)),
-        spin_sum: add(a.spin, b.spin),
-        relative_spin: sub(b.spin, a.spin),
-        radii: [a.radius, b.radius],
-        inverse_masses: a.inverse_mass + b.inverse_mass,
+        spin_sum: [wx, wy, wz],
+        relative_spin: [zero; 3],
+        radius_difference,
+        radius_sum,
+        inverse_masses,
     }
 }
 
 /// The touch of two spheres. The contact point lies on the line of centres in the middle of the overlap, at
-/// `R_i − δ/2` from i. NaN counts as touching, so that it is found.
+/// `a_i = R_i − δ/2 = ½ (d − (R_j − R_i))` from i, d the distance. NaN counts as touching, so that it is found.
+///
+/// The surfaces turn past each other with `(a_i ω_i + a_j ω_j) × n = ½ (ω_i + ω_j) × d n + ½ (R_j − R_i)(ω_j − ω_i) × n`.
 #[inline(always)]
 #[must_use]
 pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
-    let (branch, [first, second]) = (pair.branch, pair.radii);
+    let (branch, sum, difference, half) = (pair.branch, pair.radius_sum, pair.radius_difference, L::splat(0.5));
     let distance = dot(branch, branch).sqrt();
-    let sum = first + second;
     let overlap = sum - distance;
     let normal = scale(branch, L::splat(1.0) / distance);
-    // One division for two: 1/(R_i + R_j) and m_eff = 1/(1/m_i + 1/m_j).
-    let both = L::splat(1.0) / (sum * pair.inverse_masses);
-    let half_overlap = L::splat(0.5) * overlap;
     let approach = dot(pair.velocity, normal);
-    // Σ (R − δ/2) ω, the surfaces at the contact point.
-    let turning = cross(sub(pair.rim_velocity, scale(pair.spin_sum, half_overlap)), normal);
+    let mean_spin = scale(pair.spin_sum, half);
+    let mut turning = cross(mean_spin, branch);
+    let mut reduced = sum;
+    let mut arms = [half * distance; 2];
+    let mut min_radius = half * sum;
+    let unequal = pair.unequal();
+    if L::any(unequal) {
+        // By lane, so that a pair's bits do not hang on the pairs beside it.
+        let more = scale(cross(pair.relative_spin, normal), half * difference);
+        for k in 0..3 {
+            turning[k] = L::select(unequal, turning[k] + more[k], turning[k]);
+        }
+        arms = [half * (distance - difference), half * (distance + difference)];
+        min_radius = half * (sum - difference.max(-difference));
+        reduced = sum - difference * difference / sum;
+    }
     let touch = Touch {
         overlap,
         overlap_rate: -approach,
-        effective_radius: first * second * (both * pair.inverse_masses),
+        effective_radius: L::splat(0.25) * reduced,
         radius_factor: L::splat(1.0),
         overlap_factor: L::splat(1.0),
         size: sum,
-        effective_mass: both * sum,
+        effective_mass: L::splat(1.0) / pair.inverse_masses,
         normal,
         slip_velocity: sub(sub(pair.velocity, scale(normal, approach)), turning),
         relative_spin: pair.relative_spin,
-        spin_about_normal: L::splat(0.5) * dot(pair.spin_sum, normal),
+        spin_about_normal: dot(mean_spin, normal),
     };
     PairTouch {
         touching: !(L::splat(TOUCH_TOLERANCE) * sum).at_least(overlap),
         touch,
         branch,
         imposed_velocity: pair.imposed_velocity,
-        arm_first: first - half_overlap,
-        arm_second: second - half_overlap,
-        min_radius: first.min(second),
+        arm_first: arms[0],
+        arm_second: arms[1],
+        min_radius,
     }
 }
 
-/// Touch of two spheres a and b, b in the image of its packed shift.
+/// Touches of some pairs of spheres, see [`relative`].
 #[inline(always)]
 #[must_use]
-pub fn spheres<L: Lane>(a: &Bodies<L>, b: &Bodies<L>, codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
-    touch(&relative(a, b, codes, motion))
+pub fn spheres<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
+    touch(&Relative { relative_spin: L::relative_spin(records, pairs), ..relative(records, pairs, codes, motion) })
 }
 
 /// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves

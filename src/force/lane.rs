@@ -1,6 +1,6 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
-use crate::state::particles::Record;
+use crate::state::particles::{RECORD, Record};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 #[cfg(target_arch = "x86_64")]
@@ -8,9 +8,6 @@ pub mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub mod avx512;
 pub mod portable;
-
-/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, 1/I.
-pub const RECORD: usize = size_of::<Record>() / size_of::<f64>();
 
 /// One or several `f64` side by side. Every operation is the IEEE one per lane, so that any width
 /// gives the bits of the scalar one. No fused multiply-add.
@@ -56,8 +53,14 @@ pub trait Lane:
     fn any(mask: Self::Mask) -> bool;
     /// Value of a mask in one lane.
     fn lane(mask: Self::Mask, lane: usize) -> bool;
-    /// The records of `WIDTH` particles, transposed: entry `c` holds number `c` of each record.
-    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD];
+    /// The records of `WIDTH` particles that begin at these numbers of the slice (index times [`RECORD`]),
+    /// transposed: entry `c` holds number `c` of each record.
+    fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD];
+    /// What `WIDTH` pairs need of their records, transposed: position and radius, second minus first; velocity,
+    /// second minus first, and 1/m, both together; spin and radius, both together.
+    fn relative(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3];
+    /// Spin of the second less that of the first.
+    fn relative_spin(records: &[Record], pairs: [&[u32]; 2]) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
     /// `table[(code >> bits) & 7]` for the first `WIDTH` codes.
@@ -82,6 +85,17 @@ pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
     for offset in (0..count * size_of::<T>()).step_by(64) {
         avx2::prefetch_at(values.as_ptr().wrapping_add(index).addr() + offset);
     }
+}
+
+/// The record that begins at this number of the slice.
+#[inline(always)]
+fn record_at(records: &[Record], offset: u32) -> &Record {
+    &records[offset as usize / RECORD]
+}
+
+#[inline(always)]
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 impl Lane for f64 {
@@ -136,8 +150,23 @@ impl Lane for f64 {
         mask
     }
     #[inline(always)]
-    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
-        bytemuck::cast(records[index[0] as usize])
+    fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
+        bytemuck::cast(*record_at(records, offsets[0]))
+    }
+    #[inline(always)]
+    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let [a, b] = [first[0], second[0]].map(|offset| record_at(records, offset));
+        let ([x, y, z], [vx, vy, vz]) = (minus(b.position, a.position), minus(b.velocity, a.velocity));
+        let [wx, wy, wz] = [0, 1, 2].map(|k| b.spin[k] + a.spin[k]);
+        [
+            [x, y, z, b.radius - a.radius],
+            [vx, vy, vz, b.inverse_mass + a.inverse_mass],
+            [wx, wy, wz, b.radius_again + a.radius_again],
+        ]
+    }
+    #[inline(always)]
+    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
+        minus(record_at(records, second[0]).spin, record_at(records, first[0]).spin)
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], _stride: usize, offset: usize) {

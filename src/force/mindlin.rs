@@ -6,7 +6,7 @@ use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorR
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Turning, carried_share_of_vector, coulomb_limit, stiffness_loss};
+use super::slider::{Slider, Turning, coulomb_limit, stiffness_loss};
 use crate::config::PairConfig;
 
 /// Registry entry.
@@ -160,14 +160,14 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         let damping = scale(touch.slip_velocity, L::splat(self.dashpot_ratio) * normal.dashpot);
 
         let sum = add(load, damping);
-        let share = carried_share_of_vector(sum, limit);
-        let value = scale(sum, share);
+        let slider = Slider::new(sum, limit);
+        let (value, share) = (slider.carry(sum), slider.share);
 
         let mut energies = Energies::zero();
         let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
         let slipped = share * (one - share);
         for k in 0..SPRINGS {
-            let force = scale(trial[k], share);
+            let force = slider.carry(trial[k]);
             // The last spring is the long-term one, whose decay is 1.
             let relaxed = if k + 1 == SPRINGS { force } else { scale(force, L::splat(self.decay[k])) };
             let ahead = add(relaxed, advance[k]);
@@ -189,7 +189,7 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
             [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]] = ahead;
         }
         memory[3 * SPRINGS] = radius;
-        let dissipated = sub(value, scale(load, share));
+        let dissipated = sub(value, slider.carry(load));
         energies.damping = dot(dissipated, touch.slip_velocity) * L::splat(self.time_step);
         VectorResponse { value, energies }
     }

@@ -2,7 +2,7 @@
 //! records in, one output line per contact out, memory updated in place.
 
 use super::composition::{self, MAX_MEMORY};
-use super::geometry::{self, Bodies, CellMotion, PairTouch};
+use super::geometry::{self, CellMotion, PairTouch};
 use super::lane::{Lane, prefetch};
 #[cfg(target_arch = "x86_64")]
 use super::lane::{avx2::F64x4, avx512::F64x8};
@@ -283,8 +283,8 @@ impl<C: ContactLaw> LawPass<C> {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
             let rows = &mut lines.values[slot * input.stride..(slot + 1) * input.stride];
             let start = place / BLOCK * C::MEMORY;
+            let pair = geometry::wall(&records[section.first_of(place)], section.second[place], input.motion);
             let memory = &mut section.memory[start..start + C::MEMORY];
-            let pair = geometry::wall(&records[section.first[place] as usize], section.second[place], input.motion);
             let lane = place % BLOCK;
             if input.ledger {
                 laws.wall::<true>(&pair, memory, lane, rows);
@@ -322,9 +322,8 @@ impl<C: ContactLaw> LawPass<C> {
         let (mut stiffness, mut ratio) = (zero, zero);
         for place in (blocks.start * BLOCK..blocks.end * BLOCK).step_by(L::WIDTH) {
             let lanes = place..place + L::WIDTH;
-            let a = Bodies::<L>::gather(records, &section.first[lanes.clone()]);
-            let b = Bodies::<L>::gather(records, &section.second[lanes.clone()]);
-            let pair = geometry::spheres(&a, &b, &section.shift[lanes], input.motion);
+            let pairs = [&section.first[lanes.clone()], &section.second[lanes.clone()]];
+            let pair = geometry::spheres::<L>(records, pairs, &section.shift[lanes], input.motion);
             let mut values = [zero; MAX_MEMORY];
             let memory = &section.memory[place / BLOCK * C::MEMORY..(place / BLOCK + 1) * C::MEMORY];
             for column in 0..C::MEMORY {
@@ -352,10 +351,10 @@ impl<C: ContactLaw> LawPass<C> {
         let first = &section.first[place..=place];
         let wall = (section.partners == Partners::Wall).then(|| section.second[place]);
         let pair = if let Some(wall) = wall {
-            geometry::wall(&records[first[0] as usize], wall, input.motion)
+            geometry::wall(&records[section.first_of(place) - section.origin], wall, input.motion)
         } else {
-            let (a, b) = (Bodies::gather(records, first), Bodies::gather(records, &section.second[place..=place]));
-            geometry::spheres(&a, &b, &section.shift[place..=place], input.motion)
+            let pair = [first, &section.second[place..=place]];
+            geometry::spheres(records, pair, &section.shift[place..=place], input.motion)
         };
         if !self.alive(&pair) {
             observed.no_touch();
@@ -369,7 +368,7 @@ impl<C: ContactLaw> LawPass<C> {
             return;
         }
         let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
-        observed.touch(section.origin + first[0] as usize, &pair, &response, virials, wall);
+        observed.touch(section.first_of(place), &pair, &response, virials, wall);
     }
 }
 

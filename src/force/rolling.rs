@@ -4,7 +4,7 @@ use super::composition::RollingVisitor;
 use super::lane::{Lane, add, dot, scale, sub};
 use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
-use super::slider::{Turning, carried_share, carried_share_of_vector, coulomb_limit, kept_share, stiffness_loss};
+use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, stiffness_loss};
 use crate::config::PairConfig;
 
 /// Registry entry.
@@ -138,10 +138,10 @@ impl RollingLaw for SpringSlider {
         let advance = scale(roll_rate, half * step * stiffness);
         let trial = add(carried, advance);
         let limit = coulomb_limit(self.rolling_friction, normal.force) * touch.effective_radius;
-        let share = carried_share_of_vector(trial, limit);
-        let spring = scale(trial, share);
+        let slider = Slider::new(trial, limit);
+        let (spring, share) = (slider.carry(trial), slider.share);
         let damped = add(spring, scale(roll_rate, self.dashpot(inertia, stiffness)));
-        let rolling = scale(damped, carried_share_of_vector(damped, limit));
+        let rolling = Slider::new(damped, limit).carry(damped);
         [memory[0], memory[1], memory[2]] = add(spring, advance);
         energies.elastic = half * dot(spring, spring) / stiffness;
         energies.friction = share * (one - share) * dot(trial, trial) / stiffness

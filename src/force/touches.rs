@@ -16,7 +16,7 @@ const DEAD: f64 = f64::NEG_INFINITY;
 /// What is passed on only where it is used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Content {
-    /// Relative spins, for rolling laws.
+    /// Relative spins even between equal spheres, for rolling laws.
     pub rolling: bool,
     /// Imposed velocities and energies, for the energy ledger.
     pub ledger: bool,
@@ -52,10 +52,10 @@ impl<const N: usize> Numbers<N> {
 /// The contacts of one block between the stages.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockTouches {
-    relative: Numbers<15>,
+    relative: Numbers<12>,
     touch: Numbers<13>,
     normal: Numbers<3>,
-    /// Relative spin, if there is rolling.
+    /// Relative spin, if there is rolling or radii are unequal.
     relative_spin: Numbers<3>,
     /// Imposed velocity, if there is a ledger.
     imposed_velocity: Numbers<3>,
@@ -79,16 +79,17 @@ impl BlockTouches {
     pub fn put_relative<L: Lane>(&mut self, lane: usize, pair: &Relative<L>, content: Content) {
         self.relative.put(0, lane, &pair.branch);
         self.relative.put(3, lane, &pair.velocity);
-        self.relative.put(6, lane, &pair.rim_velocity);
-        self.relative.put(9, lane, &pair.spin_sum);
-        self.relative.put(12, lane, &pair.radii);
-        self.relative.put(14, lane, &[pair.inverse_masses]);
-        if content.rolling {
-            self.relative_spin.put(0, lane, &pair.relative_spin);
-        }
+        self.relative.put(6, lane, &pair.spin_sum);
+        self.relative.put(9, lane, &[pair.radius_difference, pair.radius_sum, pair.inverse_masses]);
         if content.ledger {
             self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
         }
+    }
+
+    /// Take in ω_j − ω_i \[rad/s\] of the lanes from `lane` on.
+    #[inline(always)]
+    pub fn put_relative_spin<L: Lane>(&mut self, lane: usize, relative_spin: &Vector<L>) {
+        self.relative_spin.put(0, lane, relative_spin);
     }
 
     /// The bodies of the lanes from `lane` on; what is not passed on means nothing.
@@ -98,10 +99,10 @@ impl BlockTouches {
         Relative {
             branch: self.relative.vector(0, lane),
             velocity: self.relative.vector(3, lane),
-            rim_velocity: self.relative.vector(6, lane),
-            spin_sum: self.relative.vector(9, lane),
-            radii: [self.relative.one(12, lane), self.relative.one(13, lane)],
-            inverse_masses: self.relative.one(14, lane),
+            spin_sum: self.relative.vector(6, lane),
+            radius_difference: self.relative.one(9, lane),
+            radius_sum: self.relative.one(10, lane),
+            inverse_masses: self.relative.one(11, lane),
             relative_spin: self.relative_spin.vector(0, lane),
             imposed_velocity: self.imposed_velocity.vector(0, lane),
         }
@@ -132,7 +133,7 @@ impl BlockTouches {
                 effective_radius: self.touch.one(2, lane),
                 radius_factor: L::splat(1.0),
                 overlap_factor: L::splat(1.0),
-                size: self.relative.one::<L>(12, lane) + self.relative.one(13, lane),
+                size: self.relative.one(10, lane),
                 effective_mass: self.touch.one(3, lane),
                 normal: self.touch.vector(4, lane),
                 slip_velocity: self.touch.vector(7, lane),

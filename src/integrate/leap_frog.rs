@@ -3,16 +3,16 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
-use super::gather::Lines;
+use super::gather::{ChunkEnds, Lines};
 use super::rotation::Rotation;
-use crate::contact::list::{CHUNK, End};
+use crate::contact::list::CHUNK;
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::avx2::F64x4;
 use crate::force::lane::portable::Portable;
-use crate::force::lane::{Lane, RECORD, prefetch};
+use crate::force::lane::{Lane, prefetch};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
-use crate::state::particles::{Particles, Record, padded, trimmed};
+use crate::state::particles::{Particles, RECORD, Record, padded, trimmed};
 use crate::state::shape::Shape;
 use std::ops::Range;
 
@@ -183,12 +183,12 @@ fn cross(crossed: &mut [i8; 4], wraps: [i32; 3]) {
 pub struct Batch<'a> {
     /// Places in the slice.
     pub range: Range<usize>,
-    /// Offsets of the contact list.
-    pub offsets: &'a [u32],
-    /// Ends of the contact list.
-    pub ends: &'a [End],
+    /// Their contacts.
+    pub chunk: ChunkEnds<'a>,
     /// Output lines.
     pub lines: Lines<'a>,
+    /// Room for their forces and torques.
+    pub loads: &'a mut [[f64; 8]; CHUNK],
     /// What is the same for all.
     pub motion: &'a StepMotion,
 }
@@ -222,16 +222,12 @@ fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
 /// with the radius, velocity and spin with 1/m and 1/I; constants that are 0 or 1 in the fourth lane leave them.
 #[inline(always)]
 fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    let Batch { range, offsets, ends, lines, motion } = batch;
+    let Batch { range, chunk, lines, loads, motion } = batch;
     const { assert!(L::WIDTH == 4) };
-    let mut loads = [[0.0; 2 * 4]; CHUNK];
-    let offsets = &offsets[slice.start + range.start..=slice.start + range.end];
-    lines.sum_all::<L>(offsets, ends, &mut loads);
+    lines.sum_all::<L>(&chunk, loads);
     if motion.ledger {
-        for (index, load) in range.clone().zip(&loads) {
-            let place = index - range.start;
-            let ends = &ends[offsets[place] as usize..offsets[place + 1] as usize];
-            lines.add_ledger(ends, &mut slice.ledger[index]);
+        for (place, (index, load)) in range.clone().zip(&*loads).enumerate() {
+            lines.add_ledger(chunk.of(place as u8), &mut slice.ledger[index]);
             add_external_work(&mut slice.ledger[index], &slice.record[index], load, motion);
         }
     }
@@ -245,7 +241,7 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
     let gravity = three(motion.gravity, 0.0);
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
-    for (index, load) in range.zip(&loads) {
+    for (index, load) in range.zip(loads) {
         // What the next chunk needs and no contact has touched.
         prefetch(slice.velocity, index + CHUNK, 1);
         prefetch(slice.spin, index + CHUNK, 1);
@@ -258,7 +254,7 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
         let mut velocity = L::load(&slice.velocity[index]) + kick * acceleration;
         let mut position = scale * L::load(&record[..4]) + drift * velocity;
         if motion.rotation && slice.shape.is_empty() {
-            let angular = torque * L::splat(record[11]);
+            let angular = torque * L::splat(slice.spin[index][3]);
             let spin = L::load(&slice.spin[index]) + kick * angular;
             spin.store(&mut slice.spin[index]);
             L::select(vector, spin + half * angular, L::load(&record[8..])).store(&mut record[8..]);

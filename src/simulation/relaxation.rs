@@ -225,7 +225,7 @@ impl Simulation {
             }
             let mut own = parts(&particles.velocity[index], &record.velocity, record.inverse_mass, time_step);
             if rotation {
-                let turning = parts(&particles.spin[index], &record.spin, record.inverse_inertia, time_step);
+                let turning = parts(&particles.spin[index], &record.spin, particles.spin[index][3], time_step);
                 own = [0, 1, 2].map(|k| own[k] + turning[k]);
             }
             for (sum, part) in sums.iter_mut().zip(own) {

@@ -5,7 +5,7 @@ use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
-use crate::integrate::gather::Lines;
+use crate::integrate::gather::{ChunkEnds, Lines};
 use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
 use std::ops::Range;
 
@@ -25,11 +25,12 @@ pub struct LineBuffers {
 struct Ring {
     lines: Vec<CacheLine>,
     touches: Box<[BlockTouches; BATCH]>,
+    loads: Box<[[f64; 8]; CHUNK]>,
 }
 
 impl Default for Ring {
     fn default() -> Self {
-        Self { lines: Vec::new(), touches: Box::new([BlockTouches::ZERO; BATCH]) }
+        Self { lines: Vec::new(), touches: Box::new([BlockTouches::ZERO; BATCH]), loads: Box::new([[0.0; 8]; CHUNK]) }
     }
 }
 
@@ -172,11 +173,12 @@ impl Phase<'_> {
         motion: &StepMotion,
     ) -> (StepResult, Option<PassFault>) {
         let per_strip = list.per_strip();
-        let ContactList { strips, sections, runs, offsets, ends, kept, .. } = list;
+        let ContactList { strips, sections, runs, offsets, ends, summing, kept, .. } = list;
         let view = View {
             runs,
             offsets,
             ends,
+            summing,
             kept: &bytemuck::cast_slice(&lines.kept)[..*kept * lines.stride],
             width: lines.width,
         };
@@ -211,7 +213,7 @@ impl Phase<'_> {
             return (a.0, a.1.or(b.1));
         };
         let (mut result, mut fault) = (StepResult::default(), None);
-        let Ring { lines: ring, touches } = &mut rings[0];
+        let Ring { lines: ring, touches, loads } = &mut rings[0];
         let ring: &mut [f64] = bytemuck::cast_slice_mut(ring);
         let mask = strip.ring - 1;
         let pairs = strip.near.len() / strip.chunks().max(1);
@@ -225,7 +227,14 @@ impl Phase<'_> {
             }
             let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
-            let batch = Batch { range, offsets: view.offsets, ends: view.ends, lines, motion };
+            let particles = strip.chunk(chunk);
+            let chunk = ChunkEnds {
+                offsets: &view.offsets[particles.start..=particles.end],
+                ends: view.ends,
+                summing: &view.summing[particles],
+                near_only: usize::from(strip.near_only[chunk]),
+            };
+            let batch = Batch { range, chunk, lines, loads, motion };
             leap_frog::advance(&mut slice, batch, &mut result);
         }
         (result, fault)
@@ -290,6 +299,7 @@ struct View<'a> {
     runs: &'a [Run],
     offsets: &'a [u32],
     ends: &'a [End],
+    summing: &'a [u8],
     kept: &'a [f64],
     width: usize,
 }

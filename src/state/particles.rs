@@ -19,10 +19,12 @@ pub struct Record {
     pub inverse_mass: f64,
     /// Angular velocity at the full step \[rad/s\].
     pub spin: [f64; 3],
-    /// 1/I, I = 2/5 m R² \[1/(kg m²)\]; 0 for driven particles, and for ellipsoids, whose inertia is no
-    /// single number.
-    pub inverse_inertia: f64,
+    /// The radius once more \[m\]: a vector of four holds it beside the position and beside the spin.
+    pub radius_again: f64,
 }
+
+/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, radius.
+pub const RECORD: usize = size_of::<Record>() / size_of::<f64>();
 
 /// What is constant over all particles of a species.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +54,8 @@ pub struct Particles {
     pub image: Vec<[i32; 3]>,
     /// Velocity at the last half step; the fourth number is 0.
     pub velocity: Vec<[f64; 4]>,
-    /// Angular velocity at the last half step; the fourth number is 0.
+    /// Angular velocity at the last half step; the fourth number is 1/I, I = 2/5 m R² \[1/(kg m²)\], 0 for driven
+    /// particles, and for ellipsoids, whose inertia is no single number.
     pub spin: Vec<[f64; 4]>,
     /// Orientations of spheres, unit quaternions (w, x, y, z); empty where they are not followed, and
     /// where `shape` holds them.
@@ -83,7 +86,6 @@ impl Particles {
             particles.species.push(state.species);
             particles.image.push(state.image);
             particles.velocity.push(padded(state.velocity));
-            particles.spin.push(padded(state.spin));
             if extras.ellipsoids {
                 let (semi_axes, orientation) = (state.semi_axes, state.orientation);
                 particles.shape.push(Shape { semi_axes, reserved: 0.0, orientation });
@@ -95,6 +97,9 @@ impl Particles {
             }
             let mass = ellipsoid_mass(state.semi_axes, constants.density);
             let turns_by_shape = constants.driven || extras.ellipsoids;
+            let inverse_inertia = if turns_by_shape { 0.0 } else { 2.5 / (mass * state.radius * state.radius) };
+            let [x, y, z] = state.spin;
+            particles.spin.push([x, y, z, inverse_inertia]);
             particles.record.push(Record {
                 // Never −0: the contact pass counts on it.
                 position: state.position.map(|x| x + 0.0),
@@ -102,7 +107,7 @@ impl Particles {
                 velocity: state.full_velocity,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
                 spin: state.full_spin,
-                inverse_inertia: if turns_by_shape { 0.0 } else { 2.5 / (mass * state.radius * state.radius) },
+                radius_again: state.radius,
             });
         }
         particles

@@ -9,6 +9,8 @@ use crate::contact::shift::{ShiftTable, encode};
 use crate::force::geometry::{self, Bodies, CellMotion};
 use crate::force::lane::portable::Portable;
 use crate::force::lane::{add, cross, scale, sub};
+use crate::state::particles::{RECORD, Record};
+use bytemuck::Zeroable;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{RngCore, SeedableRng};
 
@@ -288,9 +290,9 @@ fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
         let overlap = libm::pow(10.0, random.between(-4.0, -0.7)) * radii[0].min(radii[1]);
         let branch = scale(random.direction(), radii[0] + radii[1] - overlap);
         let body =
-            |position, radius| Bodies { position, radius, velocity: [0.0; 3], inverse_mass: 1.0, spin: [0.0; 3] };
-        let (a, b) = (body([0.0; 3], radii[0]), body(branch, radii[1]));
-        let sphere = geometry::spheres(&a, &b, &[encode([0; 3])], &motion);
+            |position, radius| Record { position, radius, radius_again: radius, inverse_mass: 1.0, ..Record::zeroed() };
+        let records = [body([0.0; 3], radii[0]), body(branch, radii[1])];
+        let sphere = geometry::spheres::<f64>(&records, [&[0], &[RECORD as u32]], &[encode([0; 3])], &motion);
         let pair = Ellipsoids { tensors: radii.map(sphere_tensor), branch };
         let found = pair.common_normal([0.0; 3], 0.0).found;
         let ellipse = Ellipse::new(&found.radii);

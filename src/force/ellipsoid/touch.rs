@@ -12,7 +12,7 @@ use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::Touch;
 use crate::force::simd::Simd;
-use crate::state::particles::Record;
+use crate::state::particles::{RECORD, Record};
 use crate::state::shape::{Shape, smallest_semi_axis};
 
 /// A touch of ellipsoids with the arms of its contact point.
@@ -122,7 +122,12 @@ impl Source<'_> {
         let shape_a = gather_shapes(self.shapes, first);
         let shape_b = gather_shapes(self.shapes, second);
         let codes = &self.section.shift[lanes];
-        let between_spheres = EllipsoidTouch::of_spheres(geometry::spheres(&a, &b, codes, self.surroundings.motion));
+        let between_spheres = EllipsoidTouch::of_spheres(geometry::spheres(
+            self.records,
+            [first, second],
+            codes,
+            self.surroundings.motion,
+        ));
         let round: L::Mask = shape_a.is_sphere() & shape_b.is_sphere();
         if !L::any(!round) {
             return between_spheres;
@@ -149,10 +154,10 @@ pub struct Shapes<L> {
 }
 
 #[inline(always)]
-fn gather_shapes<L: Lane>(shapes: &[Shape], index: &[u32]) -> Shapes<L> {
+fn gather_shapes<L: Lane>(shapes: &[Shape], offsets: &[u32]) -> Shapes<L> {
     let mut columns = [[0.0; BLOCK]; 7];
-    for (lane, index) in index.iter().enumerate() {
-        let shape = &shapes[*index as usize];
+    for (lane, offset) in offsets.iter().enumerate() {
+        let shape = &shapes[*offset as usize / RECORD];
         for (column, number) in columns.iter_mut().zip(shape.semi_axes.iter().chain(&shape.orientation)) {
             column[lane] = *number;
         }

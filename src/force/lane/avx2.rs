@@ -1,8 +1,8 @@
 //! Four lanes in one AVX2 register; as in the file beside this one, the functions run only where the
 //! processor has been asked.
 
-use super::{Lane, RECORD};
-use crate::state::particles::Record;
+use super::Lane;
+use crate::state::particles::{RECORD, Record};
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -71,11 +71,34 @@ unsafe fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
     }
 }
 
-/// Where the numbers of a record begin.
+/// What one pair needs of its two records, see [`Lane::relative`].
+///
+/// # Safety
+/// The processor has AVX2; `a` and `b` point at records.
 #[inline(always)]
-#[must_use]
-pub fn address(records: &[Record], index: u32) -> *const f64 {
-    (&raw const records[index as usize]).cast()
+pub(super) unsafe fn relative_rows(a: *const f64, b: *const f64) -> [__m256d; 3] {
+    // SAFETY: as the function's: twelve numbers lie at each address. b + a is b − (−a).
+    unsafe {
+        let fourth = _mm256_setr_pd(0.0, 0.0, 0.0, -0.0);
+        let from = |numbers: *const f64, group: usize| _mm256_load_pd(numbers.add(4 * group));
+        [
+            _mm256_sub_pd(from(b, 0), from(a, 0)),
+            _mm256_sub_pd(from(b, 1), _mm256_xor_pd(from(a, 1), fourth)),
+            _mm256_add_pd(from(b, 2), from(a, 2)),
+        ]
+    }
+}
+
+/// Where the records of some offsets begin.
+#[inline(always)]
+fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 4] {
+    let offsets: &[u32; 4] = offsets[..4].try_into().expect("four offsets");
+    let numbers: &[[f64; 4]] = bytemuck::cast_slice(records);
+    let start = |k: usize| {
+        let row = offsets[k] as usize / 4;
+        numbers[row..row + RECORD / 4].as_ptr().cast()
+    };
+    [start(0), start(1), start(2), start(3)]
 }
 
 /// Ask for the cache line at an address.
@@ -152,14 +175,8 @@ impl Lane for F64x4 {
         unsafe { _mm256_movemask_pd(mask.0) >> lane & 1 == 1 }
     }
     #[inline(always)]
-    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
-        let index = &index[..4];
-        let row = [
-            address(records, index[0]),
-            address(records, index[1]),
-            address(records, index[2]),
-            address(records, index[3]),
-        ];
+    fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
+        let row = rows_of(records, offsets);
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX2 (head of this file); each row points at the twelve numbers of a
@@ -178,6 +195,26 @@ impl Lane for F64x4 {
             columns[4 * group + 3] = Self(w);
         }
         columns
+    }
+    #[inline(always)]
+    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let (first, second) = (rows_of(records, first), rows_of(records, second));
+        let mut rows = [[Self::splat(0.0).0; 4]; 3];
+        for k in 0..4 {
+            // SAFETY: the processor has AVX2 (head of this file); the rows point at records.
+            [rows[0][k], rows[1][k], rows[2][k]] = unsafe { relative_rows(first[k], second[k]) };
+        }
+        let mut columns = [[Self::splat(0.0); 4]; 3];
+        for group in 0..3 {
+            // SAFETY: the processor has AVX2 (head of this file).
+            columns[group] = unsafe { transpose(rows[group]) }.map(Self);
+        }
+        columns
+    }
+    #[inline(always)]
+    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
+        let (a, b) = (Self::gather(records, first), Self::gather(records, second));
+        [b[8] - a[8], b[9] - a[9], b[10] - a[10]]
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {

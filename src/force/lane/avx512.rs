@@ -3,9 +3,9 @@
 //! Every function compiles to instructions that need AVX-512 F and VL: they run only inside the pass that
 //! [`super::super::simd`] has chosen after asking the processor, and are inlined there.
 
-use super::avx2::address;
-use super::{Lane, RECORD};
-use crate::state::particles::Record;
+use super::Lane;
+use super::avx2::relative_rows;
+use crate::state::particles::{RECORD, Record};
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -125,6 +125,27 @@ unsafe fn two_rows(low: *const f64, high: *const f64, from: usize) -> __m512d {
     }
 }
 
+#[repr(C, packed)]
+struct Unaligned(__m256i);
+
+/// Where the records of eight offsets begin.
+#[inline(always)]
+fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 8] {
+    let offsets: &[u32; 8] = offsets[..8].try_into().expect("eight offsets");
+    let count = u32::try_from(records.len() * RECORD).unwrap_or(u32::MAX);
+    // SAFETY: the processor has AVX-512 (head of this file), with VL. Volatile, so that the scalar loads of the same
+    // offsets below stay loads: taking them out of the vector costs more.
+    let inside = unsafe {
+        let last = _mm256_set1_epi32(count.saturating_sub(RECORD as u32).cast_signed());
+        _mm256_cmple_epu32_mask(offsets.as_ptr().cast::<Unaligned>().read_volatile().0, last)
+    };
+    assert!(inside == u8::MAX && count > 0, "the contact list names particles that are not there");
+    let start: *const f64 = records.as_ptr().cast();
+    // SAFETY: a whole record follows each of the eight.
+    let row = |k: usize| unsafe { start.add(offsets[k] as usize) };
+    [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)]
+}
+
 impl Lane for F64x8 {
     type Mask = Mask8;
     const WIDTH: usize = 8;
@@ -190,18 +211,8 @@ impl Lane for F64x8 {
         mask.0 >> lane & 1 == 1
     }
     #[inline(always)]
-    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
-        let index = &index[..8];
-        let row = [
-            address(records, index[0]),
-            address(records, index[1]),
-            address(records, index[2]),
-            address(records, index[3]),
-            address(records, index[4]),
-            address(records, index[5]),
-            address(records, index[6]),
-            address(records, index[7]),
-        ];
+    fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
+        let row = rows_of(records, offsets);
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX-512 (head of this file); each row points at the twelve numbers of
@@ -220,6 +231,31 @@ impl Lane for F64x8 {
             columns[4 * group + 3] = Self(w);
         }
         columns
+    }
+    #[inline(always)]
+    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let (first, second) = (rows_of(records, first), rows_of(records, second));
+        let mut result = [[Self::splat(0.0); 4]; 3];
+        // SAFETY: the processor has AVX-512 (head of this file); the rows point at records.
+        unsafe {
+            let mut rows = [[_mm512_setzero_pd(); 4]; 3];
+            for (k, (low, high)) in [(0, 2), (1, 3), (4, 6), (5, 7)].into_iter().enumerate() {
+                let (low, high) = (relative_rows(first[low], second[low]), relative_rows(first[high], second[high]));
+                for group in 0..3 {
+                    rows[group][k] = _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low[group]), high[group]);
+                }
+            }
+            for group in 0..3 {
+                let [x, y, z, w] = columns(rows[group]);
+                result[group] = [Self(x), Self(y), Self(z), Self(w)];
+            }
+        }
+        result
+    }
+    #[inline(always)]
+    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
+        let (a, b) = (Self::gather(records, first), Self::gather(records, second));
+        [b[8] - a[8], b[9] - a[9], b[10] - a[10]]
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {

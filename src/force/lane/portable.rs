@@ -1,7 +1,7 @@
 //! Lanes in plain loops: what a processor without vector instructions runs, and the reference in tests.
 
-use super::{Lane, RECORD};
-use crate::state::particles::Record;
+use super::Lane;
+use crate::state::particles::{RECORD, Record};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// `N` numbers side by side; no intrinsics, so it runs anywhere.
@@ -140,8 +140,18 @@ impl<const N: usize> Lane for Portable<N> {
         mask.0[lane]
     }
     #[inline(always)]
-    fn gather(records: &[Record], index: &[u32]) -> [Self; RECORD] {
-        let rows: [[f64; RECORD]; N] = std::array::from_fn(|k| bytemuck::cast(records[index[k] as usize]));
+    fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::gather(records, &offsets[k..]));
+        std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
+    }
+    #[inline(always)]
+    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::relative(records, [&first[k..], &second[k..]]));
+        std::array::from_fn(|group| std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][group][c]))))
+    }
+    #[inline(always)]
+    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::relative_spin(records, [&first[k..], &second[k..]]));
         std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
     }
     #[inline(always)]

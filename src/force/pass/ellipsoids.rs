@@ -196,6 +196,6 @@ impl<C: ContactLaw> LawPass<C> {
 }
 
 fn wall_touch(input: &PassInput, bodies: BodyData, section: &Section, place: usize) -> EllipsoidTouch<f64> {
-    let first = section.first[place] as usize;
+    let first = section.first_of(place);
     touch::wall(&bodies.records[first], &bodies.shapes[first], section.second[place], input.motion)
 }

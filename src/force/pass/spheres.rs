@@ -2,17 +2,17 @@
 
 use super::{Excess, PREFETCH, PassInput, first_excess};
 use crate::contact::section::{BLOCK, Section};
-use crate::force::geometry::{self, Bodies};
+use crate::force::geometry;
 use crate::force::lane::{Lane, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
 use crate::force::touches::{BATCH, BlockTouches, Content};
-use crate::state::particles::Record;
+use crate::state::particles::{RECORD, Record};
 use std::ops::Range;
 
 /// Bytes of records that need no asking ahead.
-const NEAREST_CACHES: usize = 1 << 20;
+const NEAREST_CACHES: usize = 1 << 18;
 
 /// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number.
 pub(super) fn geometry(
@@ -69,22 +69,33 @@ fn geometry_of<L: Lane>(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    let mut excess = None;
+    let (mut excess, mut unequal) = (None, false);
     let limit = L::splat(input.max_overlap_fraction);
     let lanes = || (0..BLOCK).step_by(L::WIDTH);
+    let numbers: &[f64] = bytemuck::cast_slice(records);
     let far = size_of_val(records) > NEAREST_CACHES;
     for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
         for lane in lanes() {
             let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
-            if far && places.end + PREFETCH * BLOCK <= section.second.len() {
-                for place in places.start + PREFETCH * BLOCK..places.end + PREFETCH * BLOCK {
-                    let (first, second) = (section.first[place], section.second[place]);
-                    prefetch(records, if first < second { second } else { first } as usize, 1);
+            let ahead = places.start + PREFETCH * BLOCK..places.end + PREFETCH * BLOCK;
+            if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {
+                for (first, second) in first.iter().zip(second) {
+                    prefetch(numbers, (*first).max(*second) as usize, RECORD);
                 }
             }
-            let a = Bodies::<L>::gather(records, &section.first[places.clone()]);
-            let b = Bodies::<L>::gather(records, &section.second[places.clone()]);
-            touches.put_relative(lane, &geometry::relative(&a, &b, &section.shift[places], input.motion), content);
+            let pairs = [&section.first[places.clone()], &section.second[places.clone()]];
+            let pair = geometry::relative::<L>(records, pairs, &section.shift[places], input.motion);
+            touches.put_relative(lane, &pair, content);
+            unequal |= L::any(pair.unequal());
+        }
+    }
+    if content.rolling || unequal {
+        for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
+            for lane in lanes() {
+                let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
+                let pairs = [&section.first[places.clone()], &section.second[places]];
+                touches.put_relative_spin(lane, &L::relative_spin(records, pairs));
+            }
         }
     }
     for (block, touches) in blocks.zip(touches) {
