@@ -140,11 +140,11 @@ impl BuildContext {
                     section.set(place, index as u32, wall, shift::encode([0; 3]));
                     // Both lists are in order of particle and wall.
                     let (before, cursor) = &mut old[pair];
-                    let key = |place: usize| (before.first[place], before.second[place]);
-                    while *cursor < before.count && key(*cursor) < (index as u32, wall) {
+                    let key = |place: usize| (before.first_of(place), before.second[place]);
+                    while *cursor < before.count && key(*cursor) < (index, wall) {
                         *cursor += 1;
                     }
-                    if *cursor < before.count && key(*cursor) == (index as u32, wall) {
+                    if *cursor < before.count && key(*cursor) == (index, wall) {
                         before.read_memory(*cursor, &mut row);
                         section.write_memory(place, &row);
                     }
