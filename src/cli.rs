@@ -125,19 +125,19 @@ pub fn main() -> i32 {
     };
     let done = match command {
         Command::Check { config, input } => {
-            input.load(&config).map(|config| print!("{}", config::sheet::sheet(&config)))
+            input.load(&config).map(|config| say!("{}", config::sheet::sheet(&config).trim_end()))
         }
         Command::Init => {
-            print!("{}", config::example());
+            say!("{}", config::example().trim_end());
             Ok(())
         }
         Command::Reference => {
-            print!("{}", config::reference_markdown());
+            say!("{}", config::reference_markdown().trim_end());
             Ok(())
         }
         Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
             for file in files {
-                println!("{}", file.display());
+                say!("{}", file.display());
             }
         }),
         Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
@@ -149,7 +149,7 @@ pub fn main() -> i32 {
             return verify::becker2021::main(&options).unwrap_or_else(|error| report(&error));
         }
         Command::Verify { filter, paper: None } => return verify::main(filter.as_deref()),
-        Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| println!("{digest}")),
+        Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| say!("{digest}")),
     };
     match done {
         Ok(()) => 0,

@@ -1,6 +1,14 @@
 //! dem-mpi: the discrete element method for battery electrodes and granular matter, parallel over
 //! MPI ranks and threads, with the same bits on every machine shape. See `ARCHITECTURE.md`.
 
+/// Print a line to standard output. A reader that has gone (`| head`) must not end a run.
+macro_rules! say {
+    ($($part:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($part)*);
+    }};
+}
+
 pub mod bench;
 pub mod cli;
 pub mod config;

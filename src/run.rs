@@ -75,7 +75,7 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     efforts.report(&report);
     if let Some(worst) = report.overlap.filter(|_| simulation.comm().rank() == 0) {
         let ([low, high], fraction) = (worst.ids, worst.fraction);
-        println!("packing: largest overlap {fraction:.1e} of the smaller radius (particles {low} and {high})");
+        say!("packing: largest overlap {fraction:.1e} of the smaller radius (particles {low} and {high})");
     }
     Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }

@@ -61,7 +61,7 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
     let machine = Machine { step_cost, contact_share, latency, bandwidth };
     // Lengths in radii.
     let side = libm::cbrt(particles * 4.0 / 3.0 * std::f64::consts::PI / solid_fraction);
-    println!(
+    say!(
         "{:>8} {:>14} {:>12} {:>9} {:>8} {:>9} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8}",
         "ranks",
         "grid",
@@ -82,7 +82,7 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
             HaloGeometry { grid, sides: [side; 3], periodic: [true; 3], margin: 2.0 + 2.0 * skin, particles };
         let traffic = geometry.expected(HaloContent { velocities: true, orientations: false }.bytes() as f64);
         let time = StepTime::new(&geometry, &traffic, &machine, 1.0);
-        println!(
+        say!(
             "{:>8} {:>14} {:>12.4e} {:>9.0} {:>8.1} {:>9.1} {:>10.4} {:>10.4} {:>10.4} {:>10.4} {:>8.1} {:>8.1}",
             grid.iter().product::<usize>(),
             grid.map(|n| n.to_string()).join(" × "),
@@ -98,7 +98,7 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
             100.0 * time.efficiency_with_overlap()
         );
     }
-    println!(
+    say!(
         "eff.: work over step time, nothing hidden; hidden: halo behind inner contacts. Assumed: {step_cost:e} s per \
          particle and step, {contact_share} of it contacts; latency {latency:e} s; {bandwidth:e} B/s per rank; agreement 2 \
          log2 P latencies; even load."

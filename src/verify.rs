@@ -126,25 +126,25 @@ pub fn main(filter: Option<&str>) -> i32 {
     }
     let started = Instant::now();
     let (mut passed, mut failed) = (0, 0);
-    println!("{}", aligned(&["claim", "expected", "got", "tolerance", ""].map(str::to_owned)));
+    say!("{}", aligned(&["claim", "expected", "got", "tolerance", ""].map(str::to_owned)));
     for case in cases {
-        println!("\n{}", case.name);
+        say!("\n{}", case.name);
         match (case.run)() {
             Ok(claims) => {
                 for claim in &claims {
-                    println!("{}", aligned(&claim.row()));
+                    say!("{}", aligned(&claim.row()));
                 }
                 let good = claims.iter().filter(|claim| claim.passes()).count();
                 passed += good;
                 failed += claims.len() - good;
             }
             Err(error) => {
-                println!("  FAIL: {error}");
+                say!("  FAIL: {error}");
                 failed += 1;
             }
         }
     }
-    println!("\n{passed} passed, {failed} failed, {:.1} s", started.elapsed().as_secs_f64());
+    say!("\n{passed} passed, {failed} failed, {:.1} s", started.elapsed().as_secs_f64());
     i32::from(failed > 0)
 }
 

@@ -44,7 +44,7 @@ pub fn run(comm: &Communicator, path: &Path, options: &BenchOptions) -> Result<(
     let decomposition = agree(comm, setup::decomposition(comm, &config, &initial.global))?;
     let mut simulation = setup::simulation(comm.clone(), &config, decomposition, initial, threads)?;
     if comm.rank() == 0 {
-        println!("{}: ready after {:.1} s", path.display(), started.elapsed().as_secs_f64());
+        say!("{}: ready after {:.1} s", path.display(), started.elapsed().as_secs_f64());
     }
     advance(&mut simulation, warm)?;
     let before = simulation.timers().seconds();
@@ -89,7 +89,7 @@ fn print(comm: &Communicator, simulation: &mut Simulation, shape: &Shape, spent:
     let steps = shape.steps as f64;
     let contacts = report.row.contacts as f64;
     let cores = (comm.size() * shape.threads) as f64;
-    let line = |name: &str, value: String| println!("{name:<24}{value}");
+    let line = |name: &str, value: String| say!("{name:<24}{value}");
     line("particles", format!("{particles}"));
     line("ranks x threads", format!("{} x {}", comm.size(), shape.threads));
     line("steps", format!("{steps} after {} to warm up", shape.warm));
@@ -105,7 +105,7 @@ fn print(comm: &Communicator, simulation: &mut Simulation, shape: &Shape, spent:
     line("coordination", format!("{:.4}", report.row.coordination));
     line("bytes/particle", format!("{:.0}", bytes[0] as f64 / particles));
     line("peak bytes/particle", format!("{:.0}", bytes[1] as f64 / particles));
-    println!("loop {wall} s");
+    say!("loop {wall} s");
     Ok(())
 }
 

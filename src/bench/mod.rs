@@ -98,7 +98,7 @@ pub fn main(comm: &Communicator, options: &BenchOptions) -> Result<()> {
         };
         let plan = Plan::new(particles);
         make::write(path, plan, true, options.radii)?;
-        println!("{} spheres in {}", plan.particles(), path.display());
+        say!("{} spheres in {}", plan.particles(), path.display());
         return Ok(());
     }
     if options.strong || options.weak { scaling::study(options) } else { table(options) }
@@ -111,9 +111,17 @@ fn table(options: &BenchOptions) -> Result<()> {
         given => given.to_vec(),
     };
     let folder = launch::Folder::new(options.output.as_deref())?;
-    println!(
+    say!(
         "{:>10} {:>7} {:>16} {:>19} {:>13} {:>11} {:>7} {:>11} {:>11}",
-        "particles", "layout", "particle-steps/s", "min - max", "contacts/s", "ns/contact", "Z", "B/particle", "peak"
+        "particles",
+        "layout",
+        "particle-steps/s",
+        "min - max",
+        "contacts/s",
+        "ns/contact",
+        "Z",
+        "B/particle",
+        "peak"
     );
     for size in sizes {
         let plan = Plan::new(size);
@@ -128,7 +136,7 @@ fn table(options: &BenchOptions) -> Result<()> {
             let Measurement { particles, rate, contacts, per_contact, coordination, bytes, peak_bytes, .. } =
                 series.median();
             let [low, high] = series.range().map(|rate| format!("{rate:.3e}"));
-            println!(
+            say!(
                 "{particles:>10} {:>7} {rate:>16.4e} {low:>9}-{high:>9} {contacts:>13.4e} {per_contact:>11.2} \
                  {coordination:>7.3} {bytes:>11.0} {peak_bytes:>11.0}",
                 layout.to_string()

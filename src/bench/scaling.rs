@@ -71,7 +71,7 @@ pub fn study(options: &BenchOptions) -> Result<()> {
     let efficiency = with(ideal(1.0), |row| row.efficiency);
     draw_curves(&path("speed_up.png"), &title, "cores", "speed-up", &speed_up)?;
     draw_curves(&path("efficiency.png"), &title, "cores", "parallel efficiency", &efficiency)?;
-    println!("\ntable and pictures in {}", folder.path().display());
+    say!("\ntable and pictures in {}", folder.path().display());
     Ok(())
 }
 
@@ -113,7 +113,7 @@ fn csv(rows: &[Row]) -> String {
 }
 
 fn print(rows: &[Row]) {
-    println!(
+    say!(
         "{:>10} {:>7} {:>16} {:>9} {:>10} {:>7} {:>7} {:>9} {:>11}",
         "particles",
         "layout",
@@ -126,7 +126,7 @@ fn print(rows: &[Row]) {
         "B/particle"
     );
     for Row { layout, median, speed_up, efficiency, .. } in rows {
-        println!(
+        say!(
             "{:>10} {:>7} {:>16.4e} {speed_up:>9.3} {efficiency:>10.3} {:>6.1}% {:>6.1}% {:>9.3} {:>11.0}",
             median.particles,
             layout.to_string(),

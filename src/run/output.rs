@@ -185,7 +185,7 @@ impl RunOutput {
         if let Some(log) = &mut self.log {
             log.finish();
             let state = if requeue { "requeue" } else { "stopped" };
-            println!(
+            say!(
                 "stopped by a signal at step {}; go on with --restart {}",
                 simulation.global().step,
                 self.config.output.directory.display()
@@ -222,13 +222,13 @@ impl RunOutput {
         let mut written = Ok(());
         if simulation.comm().rank() == 0 {
             let started = Instant::now();
-            println!("\n{table}\n{ranks}\n{}", effort_table(&self.efforts.rows()));
-            println!("digest {digest}");
+            say!("\n{table}\n{ranks}\n{}", effort_table(&self.efforts.rows()));
+            say!("digest {digest}");
             written = self.status("finished", &format!("digest = \"{digest}\"\n"));
             if self.config.output.plots && written.is_ok() {
                 written = plot::plot_run(&self.config.output.directory).map(|_| ());
             }
-            println!(
+            say!(
                 "results in {} (plots took {:.1} s)",
                 self.config.output.directory.display(),
                 started.elapsed().as_secs_f64()

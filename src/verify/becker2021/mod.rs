@@ -84,11 +84,11 @@ pub fn main(options: &Becker2021Options) -> Result<i32> {
     let mut figures = Vec::new();
     for (_, make) in chosen {
         let figure = make(output)?;
-        println!("\n{}", figure.title);
+        say!("\n{}", figure.title);
         for check in &figure.checks {
-            println!("  {:<72} {:>18}  {:<32} {}", check.claim, check.expected, check.got, check.verdict.word());
+            say!("  {:<72} {:>18}  {:<32} {}", check.claim, check.expected, check.got, check.verdict.word());
             if let Some(note) = check.note {
-                println!("      {note}");
+                say!("      {note}");
             }
         }
         for (name, panel) in &figure.panels {
@@ -102,8 +102,8 @@ pub fn main(options: &Becker2021Options) -> Result<i32> {
     write_atomically(&output.join("becker2021.md"), document(&figures, seconds).as_bytes())?;
     let number = |verdict| figures.iter().flat_map(|f| &f.checks).filter(|check| check.verdict == verdict).count();
     let [passed, findings, failed] = [Verdict::Pass, Verdict::Finding, Verdict::Fail].map(number);
-    println!("\n{passed} passed, {findings} findings, {failed} failed, {seconds:.1} s");
-    println!("table in {}", output.join("becker2021.md").display());
+    say!("\n{passed} passed, {findings} findings, {failed} failed, {seconds:.1} s");
+    say!("table in {}", output.join("becker2021.md").display());
     Ok(i32::from(failed > 0))
 }
 

@@ -153,7 +153,7 @@ pub fn main(options: &Wahn2022Options) -> Result<i32> {
         workers: options.workers.map_or(cores, usize::from),
         reuse: options.reuse,
     };
-    println!("{} runs, {} at a time, into {}", jobs.len(), workshop.workers, options.output.display());
+    say!("{} runs, {} at a time, into {}", jobs.len(), workshop.workers, options.output.display());
     let runs = workshop.make(&jobs, |done, job, result| {
         let outcome = match result {
             Ok(run) => format!("{:.1} s", run.wall),
@@ -170,8 +170,8 @@ pub fn main(options: &Wahn2022Options) -> Result<i32> {
     let total = started.elapsed().as_secs_f64();
     report::write(&options.output, &command(options), &chapters, total)?;
     let report::Count { passed, failed, findings } = report::count(&chapters);
-    println!("\n{passed} passed, {findings} findings, {failed} failed, {total:.1} s");
-    println!("table in {}", options.output.join("wahn2022.md").display());
+    say!("\n{passed} passed, {findings} findings, {failed} failed, {total:.1} s");
+    say!("table in {}", options.output.join("wahn2022.md").display());
     Ok(i32::from(failed > 0))
 }
 

@@ -49,11 +49,11 @@ fn effort(chapter: &Chapter) -> String {
 
 /// Print the table of one figure.
 pub fn print(chapter: &Chapter) {
-    println!("\nFig. {}: {} ({})", chapter.number, chapter.title, effort(chapter));
+    say!("\nFig. {}: {} ({})", chapter.number, chapter.title, effort(chapter));
     for check in &chapter.checks {
-        println!("  {:<72} {:>18}  {:<32} {}", check.claim, check.expected, check.got, check.verdict.word());
+        say!("  {:<72} {:>18}  {:<32} {}", check.claim, check.expected, check.got, check.verdict.word());
         if let Some(note) = check.note {
-            println!("      {note}");
+            say!("      {note}");
         }
     }
 }
