@@ -102,6 +102,7 @@ fn print(comm: &Communicator, simulation: &mut Simulation, shape: &Shape, spent:
     line("particle-steps/s", format!("{:.4e}", particles * steps / wall));
     line("contacts/s", format!("{:.4e}", contacts * steps / wall));
     line("ns/contact/step/core", format!("{:.3}", 1e9 * wall * cores / (contacts * steps)));
+    line("solid fraction", format!("{:.4}", report.row.solid_fraction));
     line("coordination", format!("{:.4}", report.row.coordination));
     line("bytes/particle", format!("{:.0}", bytes[0] as f64 / particles));
     line("peak bytes/particle", format!("{:.0}", bytes[1] as f64 / particles));

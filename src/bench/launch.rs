@@ -1,6 +1,6 @@
 //! Starts cases in processes of their own, and reads and sorts what they measured.
 
-use super::BenchOptions;
+use super::{BasePacking, BenchOptions};
 use crate::error::{Error, Result};
 use crate::output::files::create_folder;
 use std::fmt;
@@ -154,7 +154,12 @@ impl Drop for Folder {
 ///
 /// # Errors
 /// It cannot be started or fails.
-pub fn measure(packing: &Path, copies: [usize; 3], layout: Layout, options: &BenchOptions) -> Result<Measurement> {
+pub fn measure(
+    packing: &BasePacking,
+    copies: [usize; 3],
+    layout: Layout,
+    options: &BenchOptions,
+) -> Result<Measurement> {
     let failed = |what: String| Error::File { path: "bench".into(), message: what };
     let program = std::env::current_exe().map_err(|error| failed(format!("cannot find this program: {error}")))?;
     let mut words = launcher(options.launcher.as_deref(), layout, available_cores());
@@ -162,7 +167,10 @@ pub fn measure(packing: &Path, copies: [usize; 3], layout: Layout, options: &Ben
     let copies = copies.map(|n| n.to_string()).join("x");
     let mut command = Command::new(&words[0]);
     command.args(&words[1..]).args(["bench", "--copies", &copies, "--law", options.law.name()]);
-    command.args(["--threads", &layout.threads.to_string()]).arg("--packing").arg(packing);
+    command.args(["--threads", &layout.threads.to_string()]).arg("--packing").arg(&packing.path);
+    if let Some(sides) = packing.sides {
+        command.arg("--sides").args(sides.map(|side| side.to_string()));
+    }
     for (name, steps) in [("--steps", options.steps), ("--warm", options.warm)] {
         if let Some(steps) = steps {
             command.args([name, &steps.to_string()]);

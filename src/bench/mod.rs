@@ -17,7 +17,7 @@ use clap::Args;
 use launch::{Layout, Measurement, Series};
 use make::Plan;
 use std::path::{Path, PathBuf};
-use workload::Law;
+use workload::{Aspects, Law};
 
 /// Options of `dem-mpi bench`.
 #[derive(Debug, Clone, Args)]
@@ -43,8 +43,11 @@ pub struct BenchOptions {
     /// Largest over smallest radius of packings made here.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
     radii: f64,
+    /// Ellipsoids instead of spheres: ratios b/a and c/a drawn between these two, for example 0.7:1.3.
+    #[arg(long, value_name = "LOW:HIGH", conflicts_with_all = ["strong", "weak"])]
+    aspects: Option<Aspects>,
     /// Time this packing (CSV, HDF5, LAMMPS data file) on the ranks of this process, as `mpirun -n N` started them.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["particles", "layouts", "radii", "strong", "weak", "write_data"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["particles", "layouts", "radii", "aspects", "strong", "weak", "write_data"])]
     packing: Option<PathBuf>,
     /// Repeat the packing along each axis.
     #[arg(long, value_name = "AxBxC", requires = "packing")]
@@ -55,7 +58,8 @@ pub struct BenchOptions {
     /// Threads per rank with --packing.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// Make a packing of --particles spheres and write it as a LAMMPS data file; times nothing.
+    /// Make a packing of --particles particles and write it, spheres as a LAMMPS data file, ellipsoids as CSV; times
+    /// nothing.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["strong", "weak"])]
     write_data: Option<PathBuf>,
     /// Strong scaling: one size on growing layouts; table and pictures in --output.
@@ -96,9 +100,9 @@ pub fn main(comm: &Communicator, options: &BenchOptions) -> Result<()> {
         let &[particles] = &options.particles[..] else {
             return Err(Error::Input("--write-data FILE needs one --particles N".into()));
         };
-        let plan = Plan::new(particles);
-        make::write(path, plan, true, options.radii)?;
-        say!("{} spheres in {}", plan.particles(), path.display());
+        let plan = Plan::new(particles, options.aspects);
+        let [x, y, z] = make::write(path, plan, true, options.radii, options.aspects)?;
+        say!("{} particles in {}, sides {x:e} {y:e} {z:e} m", plan.particles(), path.display());
         return Ok(());
     }
     if options.strong || options.weak { scaling::study(options) } else { table(options) }
@@ -124,8 +128,8 @@ fn table(options: &BenchOptions) -> Result<()> {
         "peak"
     );
     for size in sizes {
-        let plan = Plan::new(size);
-        let file = base_packing(folder.path(), plan, options.radii)?;
+        let plan = Plan::new(size, options.aspects);
+        let file = base_packing(folder.path(), plan, options)?;
         let mut series = vec![Series::default(); layouts.len()];
         for _ in 0..options.repeats.max(1) {
             for (layout, series) in layouts.iter().zip(&mut series) {
@@ -146,13 +150,26 @@ fn table(options: &BenchOptions) -> Result<()> {
     Ok(())
 }
 
-/// The base of a plan as a file of the folder, made if it is not there.
-fn base_packing(folder: &Path, plan: Plan, ratio: f64) -> Result<PathBuf> {
-    let path = folder.join(format!("base-{}-radii-{ratio}.data", plan.base));
-    if !path.exists() {
-        make::write(&path, plan, false, ratio)?;
+/// A packing in a file.
+#[derive(Debug)]
+struct BasePacking {
+    path: PathBuf,
+    /// Sides of the cell \[m\] where the file does not have them.
+    sides: Option<[f64; 3]>,
+}
+
+/// The base of a plan as a file of the folder; one of spheres is made only if it is not there.
+fn base_packing(folder: &Path, plan: Plan, options: &BenchOptions) -> Result<BasePacking> {
+    if options.aspects.is_some() {
+        let path = folder.join(format!("base-{}-ellipsoids.csv", plan.base));
+        let sides = make::write(&path, plan, false, options.radii, options.aspects)?;
+        return Ok(BasePacking { path, sides: Some(sides) });
     }
-    Ok(path)
+    let path = folder.join(format!("base-{}-radii-{}.data", plan.base, options.radii));
+    if !path.exists() {
+        make::write(&path, plan, false, options.radii, None)?;
+    }
+    Ok(BasePacking { path, sides: None })
 }
 
 fn parse_copies(text: Option<&str>) -> Result<[usize; 3]> {

@@ -37,8 +37,8 @@ pub fn study(options: &BenchOptions) -> Result<()> {
     let layouts = if options.layouts.is_empty() { growing(available_cores()) } else { options.layouts.clone() };
     let default_folder = format!("bench-{name}");
     let folder = Folder::new(Some(options.output.as_deref().unwrap_or(Path::new(&default_folder))))?;
-    let plan = Plan::new(particles);
-    let file = base_packing(folder.path(), plan, options.radii)?;
+    let plan = Plan::new(particles, None);
+    let file = base_packing(folder.path(), plan, options)?;
     let mut series = vec![Series::default(); layouts.len()];
     for repeat in 0..options.repeats.max(1) {
         for (layout, series) in layouts.iter().zip(&mut series) {

@@ -38,15 +38,36 @@ impl Law {
     }
 }
 
+/// Between these two the ratios b/a and c/a of ellipsoids are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aspects(pub [f64; 2]);
+
+impl std::str::FromStr for Aspects {
+    type Err = String;
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let numbers: Vec<f64> = text.split(':').filter_map(|part| part.parse().ok()).collect();
+        match numbers[..] {
+            [low, high] if text.matches(':').count() == 1 && 0.1 <= low && low <= high && high <= 10.0 => {
+                Ok(Self([low, high]))
+            }
+            _ => {
+                Err("give the least and the largest ratio of the semi-axes, from 0.1 to 10, for example 0.7:1.3".into())
+            }
+        }
+    }
+}
+
 /// Where the particles come from.
 #[derive(Debug, Clone)]
 pub enum Particles<'a> {
-    /// Random close packing of so many spheres with radii 1:ratio.
+    /// Random close packing of so many spheres with radii 1:ratio, or of ellipsoids of one size.
     Made {
-        /// Number of spheres.
+        /// Number of particles.
         count: usize,
         /// Largest over smallest radius.
         ratio: f64,
+        /// Ellipsoids: b/a and c/a are drawn between these two.
+        aspects: Option<Aspects>,
     },
     /// A particle file.
     File {
@@ -122,12 +143,20 @@ skin = 0.1
         );
         // Writing to a string cannot fail.
         let _ = match &self.particles {
-            Particles::Made { count, ratio } => write!(
-                text,
-                "[packing.random_close]\ncontraction_rate = 1e-3\n[[species]]\nname = \"1\"\nmaterial = \"grain\"\n\
-                 count = {count}\n{}",
-                radii(*ratio)
-            ),
+            Particles::Made { count, ratio, aspects } => {
+                let packing = match aspects {
+                    Some(_) => "[packing.relaxation]",
+                    None => "[packing.random_close]\ncontraction_rate = 1e-3",
+                };
+                let shapes = aspects.map_or(String::new(), |Aspects([low, high])| {
+                    format!("aspect_ratios = {{ b_to_a = [{low}, {high}], c_to_a = [{low}, {high}] }}\n")
+                });
+                write!(
+                    text,
+                    "{packing}\n[[species]]\nname = \"1\"\nmaterial = \"grain\"\ncount = {count}\n{shapes}{}",
+                    radii(*ratio)
+                )
+            }
             Particles::File { path, species, sides } => {
                 for name in *species {
                     let _ =
@@ -168,7 +197,7 @@ mod tests {
     #[test]
     fn a_fast_load_meets_the_same_modulus_under_both_laws() {
         let moduli = [Law::Hertz, Law::MaxwellZener].map(|law| {
-            let particles = Particles::Made { count: 10, ratio: 3.0 };
+            let particles = Particles::Made { count: 10, ratio: 3.0, aspects: None };
             let config = Workload { particles, law, legs: vec![(Leg::AlongZ(0.2), 5)], threads: 1 }.config();
             let config = config.expect("the workload is a valid input");
             assert_eq!(config.pairs[0].normal.law.name, law.name());
