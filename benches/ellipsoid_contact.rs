@@ -50,11 +50,7 @@ fn scene(aspect: f64) -> Scene {
     let mut section = Section::new(0, Partners::Near, 3, 0);
     section.resize(PAIRS);
     for pair in 0..PAIRS {
-        let mut half = || Shape {
-            semi_axes: [0.0; 3].map(|_| random.between(1.0 / aspect, 1.0)),
-            reserved: 0.0,
-            orientation: random.unit(),
-        };
+        let mut half = || Shape::new([0.0; 3].map(|_| random.between(1.0 / aspect, 1.0)), random.unit());
         let two = [half(), half()];
         let normal: [f64; 3] = random.unit();
         let points = two.map(|shape| {
@@ -98,7 +94,7 @@ impl Scene {
             let branch = self.records[2 * pair + 1].position;
             let mut stored = [0.0; 3];
             self.section.read_memory(pair, &mut stored);
-            Ellipsoids { tensors, branch }.common_normal(stored, 0.0).evaluations
+            Ellipsoids { tensors, branch }.common_normal(stored, [0.0; 3], 0.0).evaluations
         });
         let counts: Vec<usize> = counts.collect();
         (counts.iter().sum::<usize>() as f64 / PAIRS as f64, counts.into_iter().max().unwrap_or(0))

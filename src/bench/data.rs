@@ -39,9 +39,9 @@ pub fn write(path: &Path, packing: &Packing, copies: [usize; 3]) -> Result<()> {
     let written = File::create(&temporary).and_then(|file| {
         let mut out = BufWriter::new(file);
         if packing.ellipsoids {
-            table(&mut out, packing, copies)?
+            table(&mut out, packing, copies)?;
         } else {
-            text(&mut out, packing, copies)?
+            text(&mut out, packing, copies)?;
         }
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
     });
@@ -131,7 +131,7 @@ mod tests {
         let region = Region { sides: Some([3e-5, 6e-5, 3e-5]), periodic: [true; 3] };
         let contents = read(&path, &["1"], &region).expect("read");
         let row = &contents.rows[1];
-        assert_eq!((row.position, row.semi_axes), ([1e-5, 1e-5 + 3e-5, 1e-5], body.semi_axes));
+        assert_eq!((row.position, row.semi_axes), ([1e-5, 1e-5 + 3e-5, 1e-5], Some(body.semi_axes)));
         assert_eq!(row.orientation, Some(body.orientation));
     }
 }

@@ -52,6 +52,9 @@ pub struct Section {
     pub columns: usize,
     /// Memory, the numbers of a block column by column.
     pub memory: Vec<CacheLine>,
+    /// Between ellipsoids the last normal of each contact, touching or not, where there is one: mere hints that spare a
+    /// search where a plane keeps the two apart. No result depends on them, and they may belong to another contact.
+    pub hints: Vec<[CacheLine; 3]>,
 }
 
 impl Section {
@@ -68,6 +71,7 @@ impl Section {
             shift: Vec::new(),
             columns,
             memory: Vec::new(),
+            hints: Vec::new(),
         }
     }
 

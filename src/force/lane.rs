@@ -1,13 +1,26 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
 use crate::state::particles::{RECORD, Record};
+use crate::state::shape::Shape;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 #[cfg(target_arch = "x86_64")]
 pub mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub mod avx512;
+pub mod elementary;
 pub mod portable;
+
+/// Numbers of a [`Shape`].
+pub const SHAPE: usize = size_of::<Shape>() / size_of::<f64>();
+
+/// Bits of an `f64` after its exponent.
+const SIGNIFICAND_BITS: u32 = f64::MANTISSA_DIGITS - 1;
+const SIGNIFICAND: u64 = (1 << SIGNIFICAND_BITS) - 1;
+const ONE: u64 = 1.0_f64.to_bits();
+const BIAS: f64 = 1023.0;
+/// 2^52: whole numbers added to it are the lowest bits of the sum.
+const WHOLE: f64 = (1_u64 << SIGNIFICAND_BITS) as f64;
 
 /// One or several `f64` side by side. Every operation is the IEEE one per lane, so that any width
 /// gives the bits of the scalar one. No fused multiply-add.
@@ -63,6 +76,18 @@ pub trait Lane:
     fn relative_spin(records: &[Record], pairs: [&[u32]; 2]) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
+    /// The shapes of `WIDTH` particles, transposed: semi-axes, mean radius, orientation; at the offsets of their
+    /// records.
+    fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE];
+    /// m of `x = m 2^e`, 1 ≤ m < 2, for positive normal x.
+    #[must_use]
+    fn significand(self) -> Self;
+    /// e of `x = m 2^e`, 1 ≤ m < 2, for positive normal x.
+    #[must_use]
+    fn exponent(self) -> Self;
+    /// 2^x for whole x from −1022 to 1023.
+    #[must_use]
+    fn power_of_two(self) -> Self;
     /// `table[(code >> bits) & 7]` for the first `WIDTH` codes.
     fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self;
     /// `function` of each lane by itself, such as one of `libm`: the scalar bits whatever the width.
@@ -171,6 +196,22 @@ impl Lane for f64 {
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], _stride: usize, offset: usize) {
         rows[offset..offset + 4].copy_from_slice(&values);
+    }
+    #[inline(always)]
+    fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE] {
+        bytemuck::cast(shapes[offsets[0] as usize / RECORD])
+    }
+    #[inline(always)]
+    fn significand(self) -> Self {
+        f64::from_bits(self.to_bits() & SIGNIFICAND | ONE)
+    }
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        f64::from_bits(self.to_bits() >> SIGNIFICAND_BITS | WHOLE.to_bits()) - (WHOLE + BIAS)
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        f64::from_bits((self + (WHOLE + BIAS)).to_bits() << SIGNIFICAND_BITS)
     }
     #[inline(always)]
     fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {

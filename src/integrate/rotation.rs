@@ -83,8 +83,9 @@ impl Rotation {
 fn free_turn(momentum: [f64; 3], moments: [f64; 3], time: f64) -> [f64; 4] {
     let mut momentum = momentum;
     let mut turn = [1.0, 0.0, 0.0, 0.0];
+    let times = moments.map(|moment| time / moment);
     for (axis, share) in [(0, 0.5), (1, 0.5), (2, 1.0), (1, 0.5), (0, 0.5)] {
-        let [cos, sin] = half_angle(share * time * momentum[axis] / moments[axis]);
+        let [cos, sin] = half_angle(share * momentum[axis] * times[axis]);
         let mut part = [cos, 0.0, 0.0, 0.0];
         part[1 + axis] = sin;
         turn = product(turn, part);
@@ -104,7 +105,7 @@ fn free_turn(momentum: [f64; 3], moments: [f64; 3], time: f64) -> [f64; 4] {
 #[inline]
 fn half_angle(angle: f64) -> [f64; 2] {
     let quarter = 0.25 * angle;
-    let tangent = quarter + quarter * quarter * quarter / 3.0;
+    let tangent = quarter + quarter * quarter * quarter * (1.0 / 3.0);
     let square = tangent * tangent;
     let inverse = 1.0 / (1.0 + square);
     [(1.0 - square) * inverse, 2.0 * tangent * inverse]
@@ -118,7 +119,7 @@ mod tests {
     const MASS: f64 = 5.0;
 
     fn body(semi_axes: [f64; 3]) -> Shape {
-        Shape { semi_axes, reserved: 0.0, orientation: UPRIGHT }
+        Shape::new(semi_axes, UPRIGHT)
     }
 
     fn angular_momentum(shape: &Shape, spin: [f64; 3]) -> [f64; 3] {

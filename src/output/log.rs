@@ -51,9 +51,10 @@ impl Log {
 
     /// A line of text between the rows.
     pub fn line(&self, text: &str) {
-        match &self.bar {
-            Some(bar) => bar.suspend(|| say!("{text}")),
-            None => say!("{text}"),
+        if let Some(bar) = &self.bar {
+            bar.suspend(|| say!("{text}"));
+        } else {
+            say!("{text}");
         }
     }
 

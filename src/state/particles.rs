@@ -87,8 +87,7 @@ impl Particles {
             particles.image.push(state.image);
             particles.velocity.push(padded(state.velocity));
             if extras.ellipsoids {
-                let (semi_axes, orientation) = (state.semi_axes, state.orientation);
-                particles.shape.push(Shape { semi_axes, reserved: 0.0, orientation });
+                particles.shape.push(Shape::new(state.semi_axes, state.orientation));
             } else if extras.orientation {
                 particles.orientation.push(state.orientation);
             }

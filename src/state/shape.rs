@@ -10,10 +10,19 @@ use std::f64::consts::PI;
 pub struct Shape {
     /// Semi-axes along the body's x, y, z \[m\].
     pub semi_axes: [f64; 3],
-    /// Fills the line; zero.
-    pub reserved: f64,
+    /// Radius r̂ of the sphere of equal volume, `∛(a b c)` \[m\]: kept so that no contact takes a root for it.
+    pub mean_radius: f64,
     /// Unit quaternion (w, x, y, z) that turns the body's axes into those of space.
     pub orientation: [f64; 4],
+}
+
+impl Shape {
+    /// From semi-axes \[m\] and orientation.
+    #[must_use]
+    pub fn new(semi_axes: [f64; 3], orientation: [f64; 4]) -> Self {
+        let [a, b, c] = semi_axes;
+        Self { semi_axes, mean_radius: libm::cbrt(a * b * c), orientation }
+    }
 }
 
 /// The orientation in which the body's axes are those of space.
@@ -153,7 +162,7 @@ mod tests {
     fn energy_follows_the_body() {
         // Long axis along x of space after a quarter turn about z of a body long in y.
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        let shape = Shape { semi_axes: [1.0, 3.0, 1.0], reserved: 0.0, orientation: [half, 0.0, 0.0, half] };
+        let shape = Shape::new([1.0, 3.0, 1.0], [half, 0.0, 0.0, half]);
         assert!((rotational_energy(5.0, &shape, [2.0, 0.0, 0.0]) - 0.5 * 2.0 * 4.0).abs() < 1e-12);
         assert!((rotational_energy(5.0, &shape, [0.0, 2.0, 0.0]) - 0.5 * 10.0 * 4.0).abs() < 1e-12);
     }

@@ -7,7 +7,7 @@ use crate::force::lane::{Lane, Vector, add, dot, scale, sub};
 pub const MAX_ITERATIONS: usize = 100;
 
 /// A step \[rad\] below which Newton's quadratic convergence leaves nothing to gain.
-const LAST_STEP: f64 = 1e-7;
+const LAST_STEP: f64 = 3e-7;
 
 /// Longest step \[rad\].
 const LONGEST_STEP: f64 = 0.5;
@@ -118,24 +118,36 @@ impl<L: Lane> Ellipsoids<L> {
 impl<L: Lane> Ellipsoids<L> {
     /// The common normal of a pair: from the `stored` normal of its last touch where there is one (not the zero
     /// vector), else from the cold starts d/|d| and `(M_i + M_j)⁻¹ d`, of which the lower overlap counts: deep
-    /// overlaps have several minima. Overlaps of at most `bound` \[m\] are not pursued.
+    /// overlaps have several minima. Overlaps of at most `bound` \[m\] are not pursued: where the plane across the `hint`
+    /// (a unit vector or zero) parts the two by as much, there is no cold start.
     #[inline(always)]
     #[must_use]
-    pub fn common_normal(&self, stored: Vector<L>, bound: L) -> Search<L> {
-        let warm = dot(stored, stored).greater(L::splat(0.5));
+    pub fn common_normal(&self, stored: Vector<L>, hint: Vector<L>, bound: L) -> Search<L> {
+        let half = L::splat(0.5);
+        let warm = dot(stored, stored).greater(half);
         let straight = unit(self.branch);
-        let start = choose(warm, &stored, &straight);
-        let mut first = self.search(start, bound);
-        let again = !warm & first.found.overlap.greater(bound);
-        if L::any(again) {
-            // Lanes that need no second start are below this bound from the outset.
-            let second = self.search(self.pulled_back(), L::select(again, bound, L::splat(f64::INFINITY)));
-            let lower = again & first.found.overlap.greater(second.found.overlap);
-            first.found = Found::select(lower, &second.found, &first.found);
-            first.failed = (first.failed & !lower) | (second.failed & lower);
-            first.evaluations += second.evaluations;
+        let other = choose(dot(hint, hint).greater(half), &hint, &straight);
+        // Lanes that need no search are below this bound from the outset.
+        let never = L::splat(f64::INFINITY);
+        let mut best = self.search(choose(warm, &stored, &other), L::select(warm, bound, never));
+        let cold = !warm & best.found.overlap.greater(bound);
+        if L::any(cold) {
+            let first = self.search(straight, L::select(cold, bound, never));
+            let again = cold & first.found.overlap.greater(bound);
+            let mut found = first.found;
+            let mut failed = first.failed;
+            best.evaluations += first.evaluations;
+            if L::any(again) {
+                let second = self.search(self.pulled_back(), L::select(again, bound, never));
+                let lower = again & first.found.overlap.greater(second.found.overlap);
+                found = Found::select(lower, &second.found, &found);
+                failed = (failed & !lower) | (second.failed & lower);
+                best.evaluations += second.evaluations;
+            }
+            best.found = Found::select(cold, &found, &best.found);
+            best.failed = (best.failed & !cold) | (failed & cold);
         }
-        first
+        best
     }
 
     /// `(M_i + M_j)⁻¹ d` as a unit vector: the normal of an ellipsoid of the summed tensors in the direction d.

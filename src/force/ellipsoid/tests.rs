@@ -170,7 +170,7 @@ fn ten_thousand_random_pairs_find_the_minimum_that_a_slow_optimiser_finds() {
     let (mut evaluations, mut missed) = (Vec::new(), 0);
     for number in 0..PAIRS {
         let (pair, slow) = random_pair(&mut random);
-        let search = pair.common_normal([0.0; 3], 0.0);
+        let search = pair.common_normal([0.0; 3], [0.0; 3], 0.0);
         assert!(!search.failed, "pair {number} does not converge in {MAX_ITERATIONS}");
         evaluations.push(search.evaluations);
         let expected = slow.minimum(&grid);
@@ -202,7 +202,7 @@ fn the_points_lie_on_the_surfaces_and_the_gradient_vanishes() {
     let mut random = Random::new(2);
     for _ in 0..2000 {
         let (pair, _) = random_pair(&mut random);
-        let found = pair.common_normal([0.0; 3], 0.0).found;
+        let found = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found;
         let size = dot(pair.branch, pair.branch).sqrt();
         let between = sub(sub(found.first_point, found.second_point), pair.branch);
         // Surface points are apart by δ n.
@@ -219,11 +219,11 @@ fn a_stored_normal_finds_the_same_place_in_a_few_evaluations() {
     let mut most = 0;
     for _ in 0..2000 {
         let (mut pair, _) = random_pair(&mut random);
-        let before = pair.common_normal([0.0; 3], 0.0).found;
+        let before = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found;
         let size = dot(pair.branch, pair.branch).sqrt();
         pair.branch = add(pair.branch, scale(random.direction(), 1e-5 * size));
-        let warm = pair.common_normal(before.normal, 0.0);
-        let cold = pair.common_normal([0.0; 3], 0.0);
+        let warm = pair.common_normal(before.normal, [0.0; 3], 0.0);
+        let cold = pair.common_normal([0.0; 3], [0.0; 3], 0.0);
         if warm.found.overlap > 0.0 {
             assert!((warm.found.overlap - cold.found.overlap).abs() < 1e-14 * size);
             most = most.max(warm.evaluations);
@@ -238,7 +238,7 @@ fn separated_pairs_show_no_overlap_and_stop_early() {
     for _ in 0..2000 {
         let (mut pair, _) = random_pair(&mut random);
         pair.branch = scale(pair.branch, 1.6);
-        let search = pair.common_normal([0.0; 3], 0.0);
+        let search = pair.common_normal([0.0; 3], [0.0; 3], 0.0);
         assert!(search.found.overlap <= 0.0 && !search.failed);
     }
 }
@@ -256,10 +256,10 @@ fn eight_lanes_give_the_scalar_bits() {
             branch: std::array::from_fn(|c| lanes(&|k| pairs[k].branch[c])),
         };
         let start = std::array::from_fn(|c| lanes(&|k| stored[k][c]));
-        let wide = together.common_normal(start, Portable::splat(0.0)).found;
+        let wide = together.common_normal(start, [Portable::splat(0.0); 3], Portable::splat(0.0)).found;
         let shape = Ellipse::new(&wide.radii);
         for k in 0..8 {
-            let alone = pairs[k].common_normal(stored[k], 0.0).found;
+            let alone = pairs[k].common_normal(stored[k], [0.0; 3], 0.0).found;
             let ellipse = Ellipse::new(&alone.radii);
             assert_eq!(wide.overlap.0[k].to_bits(), alone.overlap.to_bits());
             assert_eq!(wide.normal.map(|c| c.0[k].to_bits()), alone.normal.map(f64::to_bits));
@@ -294,7 +294,7 @@ fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
         let records = [body([0.0; 3], radii[0]), body(branch, radii[1])];
         let sphere = geometry::spheres::<f64>(&records, [&[0], &[RECORD as u32]], &[encode([0; 3])], &motion);
         let pair = Ellipsoids { tensors: radii.map(sphere_tensor), branch };
-        let found = pair.common_normal([0.0; 3], 0.0).found;
+        let found = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found;
         let ellipse = Ellipse::new(&found.radii);
         assert!((found.overlap / sphere.touch.overlap - 1.0).abs() < 1e-10);
         assert!((ellipse.effective_radius / sphere.touch.effective_radius - 1.0).abs() < 1e-10);
@@ -319,7 +319,7 @@ fn curvatures_at_the_vertices_are_those_of_becker_table_3() {
     let q = [0.8, 0.36, -0.48, 0.0];
     let tensors = [shape_tensor(first, q), shape_tensor(second, q)];
     let branch = turn(q, [first[0] + second[0] - 1e-8, 0.0, 0.0]);
-    let found = Ellipsoids { tensors, branch }.common_normal([0.0; 3], 0.0).found;
+    let found = Ellipsoids { tensors, branch }.common_normal([0.0; 3], [0.0; 3], 0.0).found;
     let ellipse = Ellipse::new(&found.radii);
     assert!((found.overlap / 1e-8 - 1.0).abs() < 1e-6);
     assert!((ellipse.effective_radius / reference[0] - 1.0).abs() < 1e-12);
@@ -352,7 +352,7 @@ impl Moving {
             inverse_mass: 1.0,
             spin: self.spin,
         };
-        (bodies, Shapes { semi_axes: self.semi_axes, orientation: turned })
+        (bodies, Shapes { semi_axes: self.semi_axes, mean_radius: 1e-6, orientation: turned })
     }
 }
 
@@ -374,9 +374,9 @@ fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodie
         let at = |time: f64| {
             let [(a, s), (b, t)] = [bodies[0].at(time), bodies[1].at(time)];
             touch::ellipsoids(
-                [&a, &b],
-                [&s, &t],
-                pair.common_normal([0.0; 3], 0.0).found.normal,
+                &[a, b],
+                &[s, t],
+                [pair.common_normal([0.0; 3], [0.0; 3], 0.0).found.normal, [0.0; 3]],
                 &[encode([0; 3])],
                 &surroundings,
             )

@@ -5,14 +5,14 @@
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, Found};
 use super::{radii_tensor, shape_tensor, support, tangents};
-use crate::contact::section::{BLOCK, Section};
+use crate::contact::section::{BLOCK, CacheLine, Section};
 use crate::force::geometry::{self, Bodies, CellMotion, PairTouch, TOUCH_TOLERANCE, image};
 use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::Touch;
 use crate::force::simd::Simd;
-use crate::state::particles::{RECORD, Record};
+use crate::state::particles::Record;
 use crate::state::shape::{Shape, smallest_semi_axis};
 
 /// A touch of ellipsoids with the arms of its contact point.
@@ -89,6 +89,12 @@ impl TouchBlock {
         }
     }
 
+    /// The normals of the whole block.
+    #[must_use]
+    pub fn normals(&self) -> [CacheLine; 3] {
+        [CacheLine(self.0[8]), CacheLine(self.0[9]), CacheLine(self.0[10])]
+    }
+
     /// The touches from a lane on.
     #[inline(always)]
     #[must_use]
@@ -117,31 +123,34 @@ impl Source<'_> {
         let place = self.block * BLOCK + lane;
         let lanes = place..place + L::WIDTH;
         let (first, second) = (&self.section.first[lanes.clone()], &self.section.second[lanes.clone()]);
-        let a = Bodies::<L>::gather(self.records, first);
-        let b = Bodies::<L>::gather(self.records, second);
-        let shape_a = gather_shapes(self.shapes, first);
-        let shape_b = gather_shapes(self.shapes, second);
+        let shapes = [Shapes::<L>::gather(self.shapes, first), Shapes::gather(self.shapes, second)];
         let codes = &self.section.shift[lanes];
-        let between_spheres = EllipsoidTouch::of_spheres(geometry::spheres(
-            self.records,
-            [first, second],
-            codes,
-            self.surroundings.motion,
-        ));
-        let round: L::Mask = shape_a.is_sphere() & shape_b.is_sphere();
+        let motion = self.surroundings.motion;
+        let round = shapes[0].is_sphere() & shapes[1].is_sphere();
         if !L::any(!round) {
-            return between_spheres;
+            return EllipsoidTouch::of_spheres(geometry::spheres(self.records, [first, second], codes, motion));
         }
+        let bodies = [Bodies::gather(self.records, first), Bodies::gather(self.records, second)];
         let memory = self.block * self.section.columns + self.normals;
-        let stored = [0, 1, 2].map(|k| L::load(&self.section.memory[memory + k].0[lane..]));
-        let touch = ellipsoids([&a, &b], [&shape_a, &shape_b], stored, codes, self.surroundings);
+        let stored = vector_at(&self.section.memory[memory..memory + 3], lane);
+        let hint = self.section.hints.get(self.block).map_or([L::splat(0.0); 3], |hint| vector_at(hint, lane));
+        let touch = ellipsoids(&bodies, &shapes, [stored, hint], codes, self.surroundings);
+        if !L::any(round) {
+            return touch;
+        }
+        let of_spheres = EllipsoidTouch::of_spheres(geometry::spheres(self.records, [first, second], codes, motion));
         // By lane and not by block: a pair's bits must not hang on the pairs beside it.
         let mut numbers = touch.numbers();
-        for (number, of_spheres) in numbers.iter_mut().zip(between_spheres.numbers()) {
+        for (number, of_spheres) in numbers.iter_mut().zip(of_spheres.numbers()) {
             *number = L::select(round, of_spheres, *number);
         }
         EllipsoidTouch::from_numbers(numbers)
     }
+}
+
+#[inline(always)]
+fn vector_at<L: Lane>(columns: &[CacheLine], lane: usize) -> Vector<L> {
+    [L::load(&columns[0].0[lane..]), L::load(&columns[1].0[lane..]), L::load(&columns[2].0[lane..])]
 }
 
 /// Semi-axes and orientations of some particles, transposed.
@@ -149,27 +158,20 @@ impl Source<'_> {
 pub struct Shapes<L> {
     /// Semi-axes \[m\].
     pub semi_axes: Vector<L>,
+    /// Radii of the spheres of equal volume \[m\].
+    pub mean_radius: L,
     /// Unit quaternions.
     pub orientation: [L; 4],
 }
 
-#[inline(always)]
-fn gather_shapes<L: Lane>(shapes: &[Shape], offsets: &[u32]) -> Shapes<L> {
-    let mut columns = [[0.0; BLOCK]; 7];
-    for (lane, offset) in offsets.iter().enumerate() {
-        let shape = &shapes[*offset as usize / RECORD];
-        for (column, number) in columns.iter_mut().zip(shape.semi_axes.iter().chain(&shape.orientation)) {
-            column[lane] = *number;
-        }
-    }
-    let mut lanes = [L::splat(0.0); 7];
-    for (lane, column) in lanes.iter_mut().zip(&columns) {
-        *lane = L::load(column);
-    }
-    Shapes { semi_axes: [lanes[0], lanes[1], lanes[2]], orientation: [lanes[3], lanes[4], lanes[5], lanes[6]] }
-}
-
 impl<L: Lane> Shapes<L> {
+    /// The shapes at these offsets of records.
+    #[inline(always)]
+    fn gather(shapes: &[Shape], offsets: &[u32]) -> Self {
+        let [a, b, c, mean_radius, w, x, y, z] = L::gather_shapes(shapes, offsets);
+        Self { semi_axes: [a, b, c], mean_radius, orientation: [w, x, y, z] }
+    }
+
     #[inline(always)]
     fn smallest(&self) -> L {
         self.semi_axes[0].min(self.semi_axes[1]).min(self.semi_axes[2])
@@ -181,15 +183,10 @@ impl<L: Lane> Shapes<L> {
         let [a, b, c] = self.semi_axes;
         a.at_least(b) & b.at_least(a) & b.at_least(c) & c.at_least(b)
     }
-
-    /// r̂, the radius of the sphere of equal volume \[m\].
-    #[inline(always)]
-    fn mean_radius(&self) -> L {
-        (self.semi_axes[0] * self.semi_axes[1] * self.semi_axes[2]).map(libm::cbrt)
-    }
 }
 
-/// Touch of two ellipsoids, the second in the image of its packed shift, warm from the `stored` normal. The contact
+/// Touch of two ellipsoids, the second in the image of its packed shift, warm from the stored normal or, to see that
+/// they do not touch, from a hint ([`Ellipsoids::common_normal`]). The contact
 /// point is the midpoint of the two surface points. δ̇ and the slip velocity are those of the material points there;
 /// m_eff is that of the centres. NaN counts as touching, so that it is found.
 ///
@@ -198,9 +195,9 @@ impl<L: Lane> Shapes<L> {
 #[inline(always)]
 #[must_use]
 pub fn ellipsoids<L: Lane>(
-    [a, b]: [&Bodies<L>; 2],
-    shapes: [&Shapes<L>; 2],
-    stored: Vector<L>,
+    [a, b]: &[Bodies<L>; 2],
+    shapes: &[Shapes<L>; 2],
+    [stored, hint]: [Vector<L>; 2],
     codes: &[u16],
     surroundings: &Surroundings,
 ) -> EllipsoidTouch<L> {
@@ -210,7 +207,7 @@ pub fn ellipsoids<L: Lane>(
     let [one, other] = shapes;
     let tensors = [shape_tensor(one.semi_axes, one.orientation), shape_tensor(other.semi_axes, other.orientation)];
     let bound = L::splat(-surroundings.range) * min_radius;
-    let found: Found<L> = Ellipsoids { tensors, branch }.common_normal(stored, bound).found;
+    let found: Found<L> = Ellipsoids { tensors, branch }.common_normal(stored, hint, bound).found;
     let (normal, overlap) = (found.normal, found.overlap);
     let heights = dot(normal, sub(found.first_point, found.second_point));
     let ellipse = Ellipse::new(&found.radii);
@@ -230,7 +227,7 @@ pub fn ellipsoids<L: Lane>(
         effective_radius: ellipse.effective_radius,
         radius_factor: ellipse.radius_factor,
         overlap_factor: ellipse.overlap_factor,
-        size: shapes[0].mean_radius() + shapes[1].mean_radius(),
+        size: shapes[0].mean_radius + shapes[1].mean_radius,
         effective_mass: L::splat(1.0) / (a.inverse_mass + b.inverse_mass),
         normal,
         slip_velocity: sub(velocity, scale(normal, approach)),
@@ -263,14 +260,13 @@ pub fn wall(a: &Record, shape: &Shape, wall: u32, motion: &CellMotion) -> Ellips
     let arm = sub(point, scale(normal, overlap));
     let velocity = sub(sub(imposed_velocity, a.velocity), cross(a.spin, arm));
     let approach = dot(velocity, normal);
-    let [x, y, z] = shape.semi_axes;
     let touch = Touch {
         overlap,
         overlap_rate: -approach,
         effective_radius: ellipse.effective_radius,
         radius_factor: ellipse.radius_factor,
         overlap_factor: ellipse.overlap_factor,
-        size: 2.0 * libm::cbrt(x * y * z),
+        size: 2.0 * shape.mean_radius,
         slip_velocity: sub(velocity, scale(normal, approach)),
         ..plane
     };

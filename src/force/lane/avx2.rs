@@ -1,8 +1,9 @@
 //! Four lanes in one AVX2 register; as in the file beside this one, the functions run only where the
 //! processor has been asked.
 
-use super::Lane;
+use super::{BIAS, Lane, ONE, SHAPE, SIGNIFICAND, SIGNIFICAND_BITS, WHOLE};
 use crate::state::particles::{RECORD, Record};
+use crate::state::shape::Shape;
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -227,6 +228,46 @@ impl Lane for F64x4 {
             for k in 0..4 {
                 _mm256_storeu_pd(start.add(k * stride + offset), lines[k]);
             }
+        }
+    }
+    #[inline(always)]
+    fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE] {
+        let offsets = &offsets[..4];
+        let row = |k: usize| -> &[f64; SHAPE] { bytemuck::cast_ref(&shapes[offsets[k] as usize / RECORD]) };
+        let rows = [row(0), row(1), row(2), row(3)];
+        let mut columns = [Self::splat(0.0); SHAPE];
+        for group in 0..SHAPE / 4 {
+            let one = |k: usize| Self::load(&rows[k][4 * group..]).0;
+            // SAFETY: the processor has AVX2 (head of this file).
+            let [x, y, z, w] = unsafe { transpose([one(0), one(1), one(2), one(3)]) };
+            columns[4 * group..4 * group + 4].copy_from_slice(&[Self(x), Self(y), Self(z), Self(w)]);
+        }
+        columns
+    }
+    #[inline(always)]
+    fn significand(self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        unsafe {
+            let bits = _mm256_and_si256(_mm256_castpd_si256(self.0), _mm256_set1_epi64x(SIGNIFICAND.cast_signed()));
+            Self(_mm256_castsi256_pd(_mm256_or_si256(bits, _mm256_set1_epi64x(ONE.cast_signed()))))
+        }
+    }
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file).
+        unsafe {
+            let bits = _mm256_srli_epi64::<{ SIGNIFICAND_BITS.cast_signed() }>(_mm256_castpd_si256(self.0));
+            let whole = _mm256_castpd_si256(_mm256_set1_pd(WHOLE));
+            Self(_mm256_castsi256_pd(_mm256_or_si256(bits, whole))) - Self::splat(WHOLE + BIAS)
+        }
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        let sum = self + Self::splat(WHOLE + BIAS);
+        // SAFETY: the processor has AVX2 (head of this file).
+        unsafe {
+            let bits = _mm256_slli_epi64::<{ SIGNIFICAND_BITS.cast_signed() }>(_mm256_castpd_si256(sum.0));
+            Self(_mm256_castsi256_pd(bits))
         }
     }
     #[inline(always)]

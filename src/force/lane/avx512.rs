@@ -3,9 +3,10 @@
 //! Every function compiles to instructions that need AVX-512 F and VL: they run only inside the pass that
 //! [`super::super::simd`] has chosen after asking the processor, and are inlined there.
 
-use super::Lane;
 use super::avx2::relative_rows;
+use super::{BIAS, Lane, ONE, SHAPE, SIGNIFICAND, SIGNIFICAND_BITS, WHOLE};
 use crate::state::particles::{RECORD, Record};
+use crate::state::shape::Shape;
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -269,6 +270,53 @@ impl Lane for F64x8 {
                 _mm256_storeu_pd(start.add(k * stride + offset), _mm512_castpd512_pd256(lines[k]));
                 _mm256_storeu_pd(start.add((k + 4) * stride + offset), _mm512_extractf64x4_pd::<1>(lines[k]));
             }
+        }
+    }
+    #[inline(always)]
+    fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE] {
+        let offsets = &offsets[..8];
+        let row = |k: usize| (&raw const shapes[offsets[k] as usize / RECORD]).cast::<f64>();
+        let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7)];
+        let mut result = [Self::splat(0.0); SHAPE];
+        for group in 0..SHAPE / 4 {
+            // SAFETY: the processor has AVX-512 (head of this file); each row points at the eight numbers of a
+            // shape, of which four are read from 4·group on.
+            let [x, y, z, w] = unsafe {
+                columns([
+                    two_rows(rows[0], rows[2], 4 * group),
+                    two_rows(rows[1], rows[3], 4 * group),
+                    two_rows(rows[4], rows[6], 4 * group),
+                    two_rows(rows[5], rows[7], 4 * group),
+                ])
+            };
+            result[4 * group..4 * group + 4].copy_from_slice(&[Self(x), Self(y), Self(z), Self(w)]);
+        }
+        result
+    }
+    #[inline(always)]
+    fn significand(self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        unsafe {
+            let bits = _mm512_and_si512(_mm512_castpd_si512(self.0), _mm512_set1_epi64(SIGNIFICAND.cast_signed()));
+            Self(_mm512_castsi512_pd(_mm512_or_si512(bits, _mm512_set1_epi64(ONE.cast_signed()))))
+        }
+    }
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        unsafe {
+            let bits = _mm512_srli_epi64::<SIGNIFICAND_BITS>(_mm512_castpd_si512(self.0));
+            let whole = _mm512_castpd_si512(_mm512_set1_pd(WHOLE));
+            Self(_mm512_castsi512_pd(_mm512_or_si512(bits, whole))) - Self::splat(WHOLE + BIAS)
+        }
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        let sum = self + Self::splat(WHOLE + BIAS);
+        // SAFETY: the processor has AVX-512 (head of this file).
+        unsafe {
+            let bits = _mm512_slli_epi64::<SIGNIFICAND_BITS>(_mm512_castpd_si512(sum.0));
+            Self(_mm512_castsi512_pd(bits))
         }
     }
     #[inline(always)]

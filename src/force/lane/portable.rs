@@ -1,7 +1,8 @@
 //! Lanes in plain loops: what a processor without vector instructions runs, and the reference in tests.
 
-use super::Lane;
+use super::{Lane, SHAPE};
 use crate::state::particles::{RECORD, Record};
+use crate::state::shape::Shape;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 /// `N` numbers side by side; no intrinsics, so it runs anywhere.
@@ -159,6 +160,23 @@ impl<const N: usize> Lane for Portable<N> {
         for k in 0..N {
             rows[k * stride + offset..][..4].copy_from_slice(&values.map(|v| v.0[k]));
         }
+    }
+    #[inline(always)]
+    fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::gather_shapes(shapes, &offsets[k..]));
+        std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
+    }
+    #[inline(always)]
+    fn significand(self) -> Self {
+        Self(self.0.map(f64::significand))
+    }
+    #[inline(always)]
+    fn exponent(self) -> Self {
+        Self(self.0.map(f64::exponent))
+    }
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self(self.0.map(f64::power_of_two))
     }
     #[inline(always)]
     fn look_up(table: &[f64; 8], codes: &[u16], bits: u32) -> Self {

@@ -61,8 +61,10 @@ impl<C: ContactLaw> LawPass<C> {
         let mut excess = None;
         let limit = L::splat(input.max_overlap_fraction);
         let start = blocks.start * BLOCK;
+        section.hints.resize(section.blocks(), [CacheLine([0.0; BLOCK]); 3]);
         for block in blocks {
             let touches = self.touches(input, bodies, section, block);
+            section.hints[block] = touches.normals();
             let memory = &mut section.memory[block * section.columns..(block + 1) * section.columns];
             for lane in (0..BLOCK).step_by(L::WIDTH) {
                 let place = block * BLOCK + lane;
@@ -120,28 +122,29 @@ impl<C: ContactLaw> LawPass<C> {
             }
             return;
         }
-        let kept = |value: L| L::select(alive, value, zero);
         let mut values = [zero; MAX_MEMORY];
         for column in 0..C::MEMORY {
             values[column] = L::load(&memory[column].0[lane..]);
         }
         let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
         for column in 0..C::MEMORY {
-            kept(values[column]).store(&mut memory[column].0[lane..]);
+            L::select(alive, values[column], zero).store(&mut memory[column].0[lane..]);
         }
         for (column, part) in memory[C::MEMORY..].iter_mut().zip(pair.touch.normal) {
-            kept(part).store(&mut column.0[lane..]);
+            L::select(alive, part, zero).store(&mut column.0[lane..]);
         }
         let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
-        let first = add(cross(touch.arms[0], force), response.moment).map(kept);
-        let second = add(cross(touch.arms[1], force), response.moment).map(|part| kept(-part));
+        let first = only(alive, add(cross(touch.arms[0], force), response.moment));
+        let second = only(alive, add(cross(touch.arms[1], force), response.moment));
+        let force = only(alive, force);
         let stride = input.stride;
-        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), zero], rows, stride, 0);
+        L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
         L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
-        L::scatter([second[0], second[1], second[2], zero], rows, stride, 8);
+        L::scatter([-second[0], -second[1], -second[2], zero], rows, stride, 8);
         L::scatter([zero; 4], rows, stride, 12);
         if input.ledger {
             let own = stride - LEDGER_STRIDE;
+            let kept = |value: L| L::select(alive, value, zero);
             // As between spheres.
             let work = kept(dot(force, pair.imposed_velocity) * L::splat(input.time_step));
             let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
@@ -193,6 +196,13 @@ impl<C: ContactLaw> LawPass<C> {
         let wall = (section.partners == Partners::Wall).then(|| section.second[place]);
         observed.touch(section.first_of(place), pair, &response, virials, wall);
     }
+}
+
+/// A vector where `mask` holds, 0 elsewhere.
+#[inline(always)]
+fn only<L: Lane>(mask: L::Mask, v: [L; 3]) -> [L; 3] {
+    let zero = L::splat(0.0);
+    [L::select(mask, v[0], zero), L::select(mask, v[1], zero), L::select(mask, v[2], zero)]
 }
 
 fn wall_touch(input: &PassInput, bodies: BodyData, section: &Section, place: usize) -> EllipsoidTouch<f64> {
