@@ -5,7 +5,7 @@ use super::composition::NormalVisitor;
 use super::dashpot::{CLIP, DAMPING_NONE};
 use super::lane::Lane;
 use super::law::{Column, NormalLaw, NormalResponse, Touch};
-use super::plastic::{self, MEMORY_RANGE, Peak, Plastic, YIELD_FACTOR, Yield};
+use super::plastic::{self, LoadingCurve, MEMORY_RANGE, Peak, Plastic, YIELD_FACTOR, Yield};
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
 use crate::config::PairConfig;
@@ -116,6 +116,51 @@ impl BeckerKamlah {
         }
     }
 
+    /// The loading curve beyond first yield. With `u = c/c_Y = ε − m x`, m = ε − 1, the work since first yield
+    /// beside F_Y (δ − δ_Y) is
+    /// `π Y c_Y² δ_Y [λ (u² − 1)²/2 − 2 (λ − 1.6) m Σ_i k_i (1 − x^{n+1+i})/(n+1+i)]`,
+    /// k_i the coefficients of u³ − u as a polynomial in x.
+    #[inline(always)]
+    fn beyond_yield<L: Lane>(&self, touch: &Touch<L>, first: &Yield<L>, contact_radius: L) -> Peak<L> {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let relative = touch.effective_radius / touch.size;
+        let (lambda, epsilon) = (self.pressure.at(relative), self.radius.at(relative));
+        let first_lambda = L::splat(self.plastic.pressure / self.plastic.yield_stress);
+        let u = contact_radius / first.radius_squared.sqrt();
+        let m = epsilon - one;
+        let x = zero.max((epsilon - u) / m);
+        let exponent = self.exponent;
+        let power = x.map(|x| libm::pow(x, exponent));
+        let growth = u * u - one;
+        let unit = L::splat(std::f64::consts::PI * self.plastic.yield_stress) * first.radius_squared;
+
+        let k = [
+            (epsilon * epsilon - one) * epsilon,
+            -m * (L::splat(3.0) * epsilon * epsilon - one),
+            L::splat(3.0) * epsilon * m * m,
+            -m * m * m,
+        ];
+        let mut sum = zero;
+        let mut higher = power;
+        for (i, k) in k.into_iter().enumerate() {
+            higher = higher * x;
+            sum = sum + k * (one - higher) / L::splat(exponent + 1.0 + i as f64);
+        }
+        let excess = lambda - first_lambda;
+        let shape = L::splat(0.5) * lambda * growth * growth - L::splat(2.0) * excess * m * sum;
+        let elastic_work = L::splat(0.4) * first.force * first.overlap;
+        Peak {
+            fully_plastic: u.at_least(epsilon),
+            force: first.force + unit * (lambda - excess * power) * growth,
+            force_at_first_yield_pressure: first.force + unit * first_lambda * growth,
+            contact_radius,
+            // δ − δ_Y = δ_Y (u² − 1).
+            work: elastic_work + (first.force * growth + unit * shape) * first.overlap,
+        }
+    }
+}
+
+impl LoadingCurve for BeckerKamlah {
     #[inline(always)]
     fn loading<L: Lane>(&self, touch: &Touch<L>, overlap: L) -> Peak<L> {
         let first = self.plastic.yield_point(touch);
@@ -135,60 +180,16 @@ impl BeckerKamlah {
             return elastic_peak;
         }
         let plastic = self.beyond_yield(touch, &first, contact_radius);
-        let choose = |yes, no| L::select(yielded, yes, no);
         Peak {
             fully_plastic: plastic.fully_plastic,
-            force: choose(plastic.force, elastic_peak.force),
-            force_at_first_yield_pressure: choose(
+            force: L::select(yielded, plastic.force, elastic_peak.force),
+            force_at_first_yield_pressure: L::select(
+                yielded,
                 plastic.force_at_first_yield_pressure,
                 elastic_peak.force_at_first_yield_pressure,
             ),
             contact_radius,
-            work: choose(plastic.work, elastic_peak.work),
-        }
-    }
-
-    /// The loading curve beyond first yield. With `u = c/c_Y = ε − m x`, m = ε − 1, the work since first yield
-    /// beside F_Y (δ − δ_Y) is
-    /// `π Y c_Y² δ_Y [λ (u² − 1)²/2 − 2 (λ − 1.6) m Σ_i k_i (1 − x^{n+1+i})/(n+1+i)]`,
-    /// k_i the coefficients of u³ − u as a polynomial in x.
-    #[inline(always)]
-    fn beyond_yield<L: Lane>(&self, touch: &Touch<L>, first: &Yield<L>, contact_radius: L) -> Peak<L> {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let relative = touch.effective_radius / touch.size;
-        let (lambda, epsilon) = (self.pressure.at(relative), self.radius.at(relative));
-        let first_lambda = L::splat(self.plastic.pressure / self.plastic.yield_stress);
-        let u = contact_radius / first.radius_squared.sqrt();
-        let m = epsilon - one;
-        let x = zero.max((epsilon - u) / m);
-        let exponent = self.exponent;
-        let power = x.map(|x| libm::pow(x, exponent));
-        let growth = u * u - one;
-        let unit = L::splat(std::f64::consts::PI * self.plastic.yield_stress) * first.radius_squared;
-        let force_at = |lambda: L| first.force + unit * lambda * growth;
-
-        let k = [
-            (epsilon * epsilon - one) * epsilon,
-            -m * (L::splat(3.0) * epsilon * epsilon - one),
-            L::splat(3.0) * epsilon * m * m,
-            -m * m * m,
-        ];
-        let mut sum = zero;
-        let mut higher = power;
-        for (i, k) in k.into_iter().enumerate() {
-            higher = higher * x;
-            sum = sum + k * (one - higher) / L::splat(exponent + 1.0 + i as f64);
-        }
-        let excess = lambda - first_lambda;
-        let shape = L::splat(0.5) * lambda * growth * growth - L::splat(2.0) * excess * m * sum;
-        let elastic_work = L::splat(0.4) * first.force * first.overlap;
-        Peak {
-            fully_plastic: u.at_least(epsilon),
-            force: force_at(lambda - excess * power),
-            force_at_first_yield_pressure: force_at(first_lambda),
-            contact_radius,
-            // δ − δ_Y = δ_Y (u² − 1).
-            work: elastic_work + (first.force * growth + unit * shape) * first.overlap,
+            work: L::select(yielded, plastic.work, elastic_peak.work),
         }
     }
 }
@@ -231,7 +232,7 @@ impl NormalLaw for BeckerKamlah {
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
-        self.plastic.respond(touch, memory, |overlap| self.loading(touch, overlap))
+        self.plastic.respond(touch, memory, self)
     }
 }
 

@@ -90,6 +90,12 @@ pub struct Yield<L> {
     pub radius_squared: L,
 }
 
+/// A law's curve of first loading.
+pub trait LoadingCurve {
+    /// Where it stands at an overlap \[m\].
+    fn loading<L: Lane>(&self, touch: &Touch<L>, overlap: L) -> Peak<L>;
+}
+
 /// Where the loading curve stands at an overlap.
 #[derive(Debug, Clone, Copy)]
 pub struct Peak<L: Lane> {
@@ -189,12 +195,7 @@ impl Plastic {
     /// as far as it grew in this step.
     #[inline(always)]
     #[must_use]
-    pub fn respond<L: Lane>(
-        &self,
-        touch: &Touch<L>,
-        memory: &mut [L],
-        loading: impl Fn(L) -> Peak<L>,
-    ) -> NormalResponse<L> {
+    pub fn respond<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L], law: &impl LoadingCurve) -> NormalResponse<L> {
         let zero = L::splat(0.0);
         let overlap = touch.overlap;
         // The memory comes first: a comparison with NaN is false, so a NaN stays visible.
@@ -202,7 +203,7 @@ impl Plastic {
         let first_yield = self.yield_point(touch).overlap;
         let yielded = largest.greater(first_yield);
         let top = L::select(yielded, largest, zero.max(overlap));
-        let peak = loading(top);
+        let peak = law.loading(touch, top);
         let hertz = self.hertz_force(touch, Self::hertz_radius(touch, top), top);
         let recovery = L::select(yielded, top * (peak.force_at_first_yield_pressure / hertz), top);
         let plastic_overlap = top - recovery;

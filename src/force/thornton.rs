@@ -4,7 +4,7 @@ use super::composition::NormalVisitor;
 use super::dashpot::{CLIP, DAMPING_NONE};
 use super::lane::Lane;
 use super::law::{Column, NormalLaw, NormalResponse, Touch};
-use super::plastic::{self, MEMORY_RANGE, Peak, Plastic, YIELD_FACTOR};
+use super::plastic::{self, LoadingCurve, MEMORY_RANGE, Peak, Plastic, YIELD_FACTOR};
 use super::registry::{LawEntry, Role};
 use super::shear::ShearSprings;
 use crate::config::PairConfig;
@@ -46,7 +46,9 @@ impl Thornton {
     pub fn new(pair: &PairConfig) -> Self {
         Self { plastic: Plastic::new(pair) }
     }
+}
 
+impl LoadingCurve for Thornton {
     #[inline(always)]
     fn loading<L: Lane>(&self, touch: &Touch<L>, overlap: L) -> Peak<L> {
         let first = self.plastic.yield_point(touch);
@@ -93,7 +95,7 @@ impl NormalLaw for Thornton {
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
-        self.plastic.respond(touch, memory, |overlap| self.loading(touch, overlap))
+        self.plastic.respond(touch, memory, self)
     }
 }
 

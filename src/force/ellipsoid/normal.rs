@@ -130,7 +130,9 @@ impl<L: Lane> Ellipsoids<L> {
         // Lanes that need no search are below this bound from the outset.
         let never = L::splat(f64::INFINITY);
         let mut best = self.search(choose(warm, &stored, &other), L::select(warm, bound, never));
-        let cold = !warm & best.found.overlap.greater(bound);
+        // With room for rounding: whether a pair is near enough must not hang on the hint.
+        let parted = bound - L::splat(1e-12) * dot(self.branch, self.branch).sqrt();
+        let cold = !warm & best.found.overlap.greater(parted);
         if L::any(cold) {
             let first = self.search(straight, L::select(cold, bound, never));
             let again = cold & first.found.overlap.greater(bound);

@@ -63,7 +63,9 @@ pub fn regimes(output: &Path) -> Result<Figure> {
         },
     )?;
     let turn = looks.windows(2).position(|pair| pair[1].strain < pair[0].strain).unwrap_or(looks.len() - 1);
-    let (loaded, unloaded) = (&looks[turn], &looks[looks.len() - 1]);
+    // Between the last two looks before the turn lie steps of unloading.
+    let (loaded, unloaded) = (&looks[turn.saturating_sub(1)], &looks[looks.len() - 1]);
+    let largest_pressure = looks.iter().map(|look| look.pressure).fold(0.0, f64::max);
     let yielded = |look: &Look| look.shares[1] + look.shares[2];
     let sum_off = looks.iter().skip(1).map(|look| (look.shares.iter().sum::<f64>() - 1.0).abs());
     let checks = vec![
@@ -76,17 +78,23 @@ pub fn regimes(output: &Path) -> Result<Figure> {
         ),
         Check::within("share beyond yield at the start", [0.0, 0.0], Unit::Percent, &[yielded(&looks[1])]),
         Check::within(
-            "share beyond yield, loading, at the largest strain",
+            "share on the loading curve beyond yield, at the largest strain",
             [0.2, 1.0],
             Unit::Percent,
             &[yielded(loaded)],
+        ),
+        Check::within(
+            "share that has yielded, at the largest strain",
+            [0.5, 1.0],
+            Unit::Percent,
+            &[yielded(loaded) + loaded.shares[3]],
         ),
         Check::within("share unloading after unloading", [0.2, 1.0], Unit::Percent, &[unloaded.shares[3]]),
         Check::within(
             "mean stress after unloading over the largest",
             [0.0, 0.6],
             Unit::Plain,
-            &[unloaded.pressure / loaded.pressure],
+            &[unloaded.pressure / largest_pressure],
         ),
     ];
     let highest = looks.iter().map(|look| look.strain).fold(0.0, f64::max);
