@@ -244,6 +244,24 @@ fn separated_pairs_show_no_overlap_and_stop_early() {
 }
 
 #[test]
+fn a_hint_changes_no_touch_and_no_gap() {
+    let mut random = Random::new(9);
+    let none = [0.0; 3];
+    for number in 0..10_000 {
+        let (mut pair, _) = random_pair(&mut random);
+        let found = pair.common_normal(none, none, 0.0).found;
+        let hinted = pair.common_normal(none, found.normal, 0.0).found;
+        assert_eq!((hinted.overlap, hinted.normal), (found.overlap, found.normal));
+        // Apart along the normal by little or much: without the hint the search must see it too.
+        let gap = libm::pow(10.0, random.between(-9.0, -0.5)) * dot(pair.branch, pair.branch).sqrt();
+        pair.branch = add(pair.branch, scale(found.normal, found.overlap + gap));
+        assert!(pair.common_normal(none, found.normal, 0.0).found.overlap <= 0.0);
+        let cold = pair.common_normal(none, none, 0.0).found.overlap;
+        assert!(cold <= 0.0, "pair {number}, gap {gap:e}: {cold:e}");
+    }
+}
+
+#[test]
 fn eight_lanes_give_the_scalar_bits() {
     let mut random = Random::new(5);
     for _ in 0..200 {
