@@ -179,7 +179,7 @@ impl Simulation {
         for index in 0..particles.owned {
             if particles.record[index].inverse_mass > 0.0 {
                 particles.velocity[index] = [0.0; 4];
-                particles.spin[index] = [0.0; 4];
+                particles.spin[index][..3].fill(0.0);
                 particles.record[index].velocity = [0.0; 3];
                 particles.record[index].spin = [0.0; 3];
             }
