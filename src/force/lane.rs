@@ -118,11 +118,6 @@ fn record_at(records: &[Record], offset: u32) -> &Record {
     &records[offset as usize / RECORD]
 }
 
-#[inline(always)]
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 impl Lane for f64 {
     type Mask = bool;
     const WIDTH: usize = 1;
@@ -181,8 +176,8 @@ impl Lane for f64 {
     #[inline(always)]
     fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
         let [a, b] = [first[0], second[0]].map(|offset| record_at(records, offset));
-        let ([x, y, z], [vx, vy, vz]) = (minus(b.position, a.position), minus(b.velocity, a.velocity));
-        let [wx, wy, wz] = [0, 1, 2].map(|k| b.spin[k] + a.spin[k]);
+        let ([x, y, z], [vx, vy, vz]) = (sub(b.position, a.position), sub(b.velocity, a.velocity));
+        let [wx, wy, wz] = add(b.spin, a.spin);
         [
             [x, y, z, b.radius - a.radius],
             [vx, vy, vz, b.inverse_mass + a.inverse_mass],
@@ -191,7 +186,7 @@ impl Lane for f64 {
     }
     #[inline(always)]
     fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
-        minus(record_at(records, second[0]).spin, record_at(records, first[0]).spin)
+        sub(record_at(records, second[0]).spin, record_at(records, first[0]).spin)
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], _stride: usize, offset: usize) {

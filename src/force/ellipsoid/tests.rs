@@ -258,6 +258,13 @@ fn a_hint_changes_no_touch_and_no_gap() {
         assert!(pair.common_normal(none, found.normal, 0.0).found.overlap <= 0.0);
         let cold = pair.common_normal(none, none, 0.0).found.overlap;
         assert!(cold <= 0.0, "pair {number}, gap {gap:e}: {cold:e}");
+        // A law that reaches over a gap: near enough with the hint or not at all.
+        let bound = -gap * random.between(0.5, 2.0);
+        let [with, without] = [found.normal, none].map(|hint| pair.common_normal(none, hint, bound).found);
+        assert_eq!(with.overlap > bound, without.overlap > bound, "pair {number}");
+        if with.overlap > bound {
+            assert_eq!((with.overlap, with.normal), (without.overlap, without.normal));
+        }
     }
 }
 

@@ -81,7 +81,7 @@ pub(super) unsafe fn relative_rows(a: *const f64, b: *const f64) -> [__m256d; 3]
     // SAFETY: as the function's: twelve numbers lie at each address. b + a is b − (−a).
     unsafe {
         let fourth = _mm256_setr_pd(0.0, 0.0, 0.0, -0.0);
-        let from = |numbers: *const f64, group: usize| _mm256_load_pd(numbers.add(4 * group));
+        let from = |numbers: *const f64, group: usize| _mm256_loadu_pd(numbers.add(4 * group));
         [
             _mm256_sub_pd(from(b, 0), from(a, 0)),
             _mm256_sub_pd(from(b, 1), _mm256_xor_pd(from(a, 1), fourth)),
