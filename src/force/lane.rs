@@ -103,7 +103,8 @@ pub trait Lane:
     }
 }
 
-/// Ask for the cache lines of `count` values from place `index` on to be brought near, there or not. Changes nothing.
+/// Ask for the cache lines of `count` values from place `index` on to be brought into the second cache, there or not.
+/// Changes nothing. Not into the first: the few places where it waits for memory are better left to what is needed now.
 #[inline(always)]
 pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
     #[cfg(target_arch = "x86_64")]

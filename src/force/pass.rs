@@ -25,8 +25,14 @@ use laws::Laws;
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
 
-/// How many blocks ahead memory and records are asked for.
-const PREFETCH: usize = 8;
+/// How many blocks ahead records are asked for.
+const RECORDS_AHEAD: usize = 16;
+
+/// How many blocks ahead the list and the memory are asked for: the list before the records that it names.
+const LIST_AHEAD: usize = 2 * RECORDS_AHEAD;
+
+/// Bytes of records beyond which a system has outgrown the nearest caches.
+const NEAREST_CACHES: usize = 1 << 18;
 
 /// What all passes of a step share.
 #[derive(Debug, Clone, Copy)]
@@ -203,10 +209,17 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         let Job { input, bodies, section, blocks, mut lines, touches } = job;
         let records = bodies.records;
         let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
+        let far = size_of_val(records) > NEAREST_CACHES;
         let mut excess = None;
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);
-            prefetch(&section.memory, (start + PREFETCH) * C::MEMORY, BATCH * C::MEMORY);
+            if far {
+                let ahead = start + LIST_AHEAD;
+                prefetch(&section.memory, ahead * C::MEMORY, BATCH * C::MEMORY);
+                prefetch(&section.first, ahead * BLOCK, BATCH * BLOCK);
+                prefetch(&section.second, ahead * BLOCK, BATCH * BLOCK);
+                prefetch(&section.shift, ahead * BLOCK, BATCH * BLOCK);
+            }
             let found = spheres::geometry(input, records, section, blocks.clone(), content, touches);
             excess = excess.or(found);
             let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };

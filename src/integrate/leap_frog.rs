@@ -16,6 +16,9 @@ use crate::state::particles::{Particles, RECORD, Record, padded, trimmed};
 use crate::state::shape::Shape;
 use std::ops::Range;
 
+/// How many particles ahead velocities and reference positions are asked for.
+const AHEAD: usize = 2 * CHUNK;
+
 /// What is the same for all particles in one step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepMotion {
@@ -242,10 +245,10 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
     for (index, load) in range.zip(loads) {
-        // What the next chunk needs and no contact has touched.
-        prefetch(slice.velocity, index + CHUNK, 1);
-        prefetch(slice.spin, index + CHUNK, 1);
-        prefetch(slice.reference, index + CHUNK, 1);
+        // What a later chunk needs and no contact has touched.
+        prefetch(slice.velocity, index + AHEAD, 1);
+        prefetch(slice.spin, index + AHEAD, 1);
+        prefetch(slice.reference, index + AHEAD, 1);
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
         let inverse_mass = L::splat(record[7]);

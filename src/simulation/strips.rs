@@ -2,6 +2,7 @@
 
 use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
+use crate::force::lane::prefetch;
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
@@ -218,6 +219,8 @@ impl Phase<'_> {
         let mask = strip.ring - 1;
         let pairs = strip.near.len() / strip.chunks().max(1);
         for chunk in 0..strip.chunks() {
+            let particles = strip.chunk(chunk);
+            view.ask_for(&particles);
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
                 let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
@@ -227,7 +230,6 @@ impl Phase<'_> {
             }
             let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
-            let particles = strip.chunk(chunk);
             let chunk = ChunkEnds {
                 offsets: &view.offsets[particles.start..=particles.end],
                 ends: view.ends,
@@ -302,4 +304,14 @@ struct View<'a> {
     summing: &'a [u8],
     kept: &'a [f64],
     width: usize,
+}
+
+impl View<'_> {
+    /// Ask for what the sums of these particles read, so that it is there after their contacts.
+    fn ask_for(&self, particles: &Range<usize>) {
+        let [first, last] = [particles.start, particles.end].map(|particle| self.offsets[particle] as usize);
+        prefetch(self.ends, first, last - first);
+        prefetch(self.summing, particles.start, CHUNK);
+        prefetch(self.offsets, particles.end, CHUNK);
+    }
 }

@@ -106,7 +106,7 @@ fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 4] {
 #[inline(always)]
 pub fn prefetch_at(address: usize) {
     // SAFETY: a prefetch is a hint that every x86-64 processor knows; it never faults, whatever the address.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::without_provenance(address)) };
+    unsafe { _mm_prefetch::<_MM_HINT_T1>(std::ptr::without_provenance(address)) };
 }
 
 impl Lane for F64x4 {

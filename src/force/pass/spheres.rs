@@ -1,6 +1,6 @@
 //! The geometric stages of the contact pass between spheres: the bodies relative to each other, then the touch.
 
-use super::{Excess, PREFETCH, PassInput, first_excess};
+use super::{Excess, NEAREST_CACHES, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, Section};
 use crate::force::geometry;
 use crate::force::lane::{Lane, prefetch};
@@ -10,9 +10,6 @@ use crate::force::simd::Simd;
 use crate::force::touches::{BATCH, BlockTouches, Content};
 use crate::state::particles::{RECORD, Record};
 use std::ops::Range;
-
-/// Bytes of records that need no asking ahead.
-const NEAREST_CACHES: usize = 1 << 18;
 
 /// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number.
 pub(super) fn geometry(
@@ -77,7 +74,7 @@ fn geometry_of<L: Lane>(
     for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
         for lane in lanes() {
             let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
-            let ahead = places.start + PREFETCH * BLOCK..places.end + PREFETCH * BLOCK;
+            let ahead = places.start + RECORDS_AHEAD * BLOCK..places.end + RECORDS_AHEAD * BLOCK;
             if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {
                 for (first, second) in first.iter().zip(second) {
                     prefetch(numbers, (*first).max(*second) as usize, RECORD);
