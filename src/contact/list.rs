@@ -45,6 +45,10 @@ pub struct Strip {
     pub ring: usize,
     /// For each chunk how many of its particles have near contacts only.
     pub near_only: Vec<u8>,
+    /// Kept lines that the particles' sums read, chunk by chunk.
+    pub kept_reads: Vec<u32>,
+    /// For each chunk the end of its part of `kept_reads`.
+    pub kept_read_ends: Vec<u32>,
 }
 
 impl Strip {
@@ -52,6 +56,13 @@ impl Strip {
     #[must_use]
     pub fn chunks(&self) -> usize {
         self.particles.len().div_ceil(CHUNK)
+    }
+
+    /// Kept lines that the sums of a chunk read.
+    #[must_use]
+    pub fn kept_reads_of(&self, chunk: usize) -> &[u32] {
+        let start = chunk.checked_sub(1).map_or(0, |before| self.kept_read_ends[before]);
+        &self.kept_reads[start as usize..self.kept_read_ends[chunk] as usize]
     }
 
     /// Local indices of a chunk.
@@ -127,8 +138,16 @@ impl ContactList {
                 self.sections.extend(sections.map(|(pair, columns)| Section::new(pair, partners, *columns, origin)));
             }
         }
-        let strip =
-            |particles| Strip { particles, near: 0..0, kept: 0..0, first_line: 0, ring: BLOCK, near_only: Vec::new() };
+        let strip = |particles| Strip {
+            particles,
+            near: 0..0,
+            kept: 0..0,
+            first_line: 0,
+            ring: BLOCK,
+            near_only: Vec::new(),
+            kept_reads: Vec::new(),
+            kept_read_ends: Vec::new(),
+        };
         self.strips = strips.into_iter().map(strip).collect();
     }
 
@@ -248,6 +267,14 @@ impl ContactList {
             });
             strip.near_only.clear();
             strip.near_only.extend(chunks);
+            strip.kept_reads.clear();
+            strip.kept_read_ends.clear();
+            for chunk in 0..strip.chunks() {
+                let particles = strip.chunk(chunk);
+                let ends = &ends[offsets[particles.start] as usize..offsets[particles.end] as usize];
+                strip.kept_reads.extend(ends.iter().map(|end| end.line()).filter(|line| line < kept).map(|line| line as u32));
+                strip.kept_read_ends.push(strip.kept_reads.len() as u32);
+            }
         }
     }
 

@@ -182,6 +182,7 @@ impl Phase<'_> {
             summing,
             kept: &bytemuck::cast_slice(&lines.kept)[..*kept * lines.stride],
             width: lines.width,
+            stride: lines.stride,
         };
         let work = Work {
             strips: &strips[which.clone()],
@@ -220,7 +221,8 @@ impl Phase<'_> {
         let pairs = strip.near.len() / strip.chunks().max(1);
         for chunk in 0..strip.chunks() {
             let particles = strip.chunk(chunk);
-            view.ask_for(&particles);
+            view.ask_for_ends(&particles);
+            view.ask_for_lines(strip.kept_reads_of(chunk));
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
                 let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
@@ -228,7 +230,7 @@ impl Phase<'_> {
                 let found = self.evaluate(run, work.first_section, work.sections, bodies, lines, touches);
                 fault = fault.or(found);
             }
-            let lines = Lines { width: view.width, stride: self.input.stride, kept: view.kept, ring: &*ring, mask };
+            let lines = Lines { width: view.width, stride: view.stride, kept: view.kept, ring: &*ring, mask };
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
             let chunk = ChunkEnds {
                 offsets: &view.offsets[particles.start..=particles.end],
@@ -304,14 +306,22 @@ struct View<'a> {
     summing: &'a [u8],
     kept: &'a [f64],
     width: usize,
+    stride: usize,
 }
 
 impl View<'_> {
-    /// Ask for what the sums of these particles read, so that it is there after their contacts.
-    fn ask_for(&self, particles: &Range<usize>) {
+    /// Ask for what the sums of these particles read beside the lines, so that it is there after their contacts.
+    fn ask_for_ends(&self, particles: &Range<usize>) {
         let [first, last] = [particles.start, particles.end].map(|particle| self.offsets[particle] as usize);
         prefetch(self.ends, first, last - first);
         prefetch(self.summing, particles.start, CHUNK);
-        prefetch(self.offsets, particles.end, CHUNK);
+        prefetch(self.offsets, particles.end, 2 * CHUNK);
+    }
+
+    /// Ask for kept lines.
+    fn ask_for_lines(&self, lines: &[u32]) {
+        for line in lines {
+            prefetch(self.kept, *line as usize * self.stride, self.stride);
+        }
     }
 }
