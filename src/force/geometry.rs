@@ -3,7 +3,7 @@
 use super::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
 use crate::contact::shift::{self, ShiftTable};
-use crate::state::particles::{RECORD, Record};
+use crate::state::particles::Record;
 
 /// A contact exists where δ exceeds this fraction of R_i + R_j: image pairs that just touch (W Fig. 8)
 /// sit at δ = 0 up to rounding and must not flicker.
@@ -24,37 +24,6 @@ pub struct CellMotion {
     pub gradient: [f64; 3],
     /// Absolute velocity of the high walls (BC; zero in BCT, where `gradient` holds it) \[m/s\].
     pub wall_velocity: [f64; 3],
-}
-
-/// Records of one side of some contacts, transposed.
-#[derive(Debug, Clone, Copy)]
-pub struct Bodies<L> {
-    /// Wrapped positions \[m\].
-    pub position: Vector<L>,
-    /// Radii \[m\].
-    pub radius: L,
-    /// Velocities at the full step \[m/s\].
-    pub velocity: Vector<L>,
-    /// 1/m \[1/kg\].
-    pub inverse_mass: L,
-    /// Angular velocities at the full step \[rad/s\].
-    pub spin: Vector<L>,
-}
-
-impl<L: Lane> Bodies<L> {
-    /// The records at the first `L::WIDTH` offsets.
-    #[inline(always)]
-    #[must_use]
-    pub fn gather(records: &[Record], offsets: &[u32]) -> Self {
-        let c: [L; RECORD] = L::gather(records, offsets);
-        Self {
-            position: [c[0], c[1], c[2]],
-            radius: c[3],
-            velocity: [c[4], c[5], c[6]],
-            inverse_mass: c[7],
-            spin: [c[8], c[9], c[10]],
-        }
-    }
 }
 
 /// A touch with what the output line needs beside the law's view.

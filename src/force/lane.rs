@@ -1,7 +1,7 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
 use crate::state::particles::{RECORD, Record};
-use crate::state::shape::Shape;
+use crate::state::shape::{Number, Shape};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 #[cfg(target_arch = "x86_64")]
@@ -100,6 +100,17 @@ pub trait Lane:
             *value = function(*value);
         }
         Self::load(&values)
+    }
+}
+
+impl<L: Lane> Number for L {
+    #[inline(always)]
+    fn number(value: f64) -> Self {
+        L::splat(value)
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
     }
 }
 

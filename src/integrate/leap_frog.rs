@@ -4,12 +4,13 @@
 //! half the old one and (2.4) half the new one.
 
 use super::gather::{ChunkEnds, Lines};
-use super::rotation::Rotation;
+use super::rotation::{Body, Rotation, Spins};
 use crate::contact::list::CHUNK;
+use crate::contact::section::BLOCK;
 #[cfg(target_arch = "x86_64")]
-use crate::force::lane::avx2::F64x4;
+use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::lane::portable::Portable;
-use crate::force::lane::{Lane, prefetch};
+use crate::force::lane::{Lane, SHAPE, prefetch};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, RECORD, Record, padded, trimmed};
@@ -205,26 +206,27 @@ pub fn advance(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         Simd::Avx2 => unsafe { advance_avx2(slice, batch, result) },
-        _ => advance_range::<Portable<4>>(slice, batch, result),
+        _ => advance_range::<Portable<4>, f64>(slice, batch, result),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn advance_avx2(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    advance_range::<F64x4>(slice, batch, result);
+    advance_range::<F64x4, F64x4>(slice, batch, result);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl")]
 fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    advance_range::<F64x4>(slice, batch, result);
+    advance_range::<F64x4, F64x8>(slice, batch, result);
 }
 
 /// Sums first, then the motion, a particle at a time in lanes (x, y, z, not used). A position shares its lanes
 /// with the radius, velocity and spin with 1/m and 1/I; constants that are 0 or 1 in the fourth lane leave them.
+/// Ellipsoids turn before, in the lanes `W` side by side.
 #[inline(always)]
-fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
     let Batch { range, chunk, lines, loads, motion } = batch;
     const { assert!(L::WIDTH == 4) };
     lines.sum_all::<L>(&chunk, loads);
@@ -244,6 +246,9 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
     let gravity = three(motion.gravity, 0.0);
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
+    if !slice.shape.is_empty() {
+        turn_all::<W>(slice, range.clone(), loads, motion);
+    }
     for (index, load) in range.zip(loads) {
         // What a later chunk needs and no contact has touched.
         prefetch(slice.velocity, index + AHEAD, 1);
@@ -266,9 +271,6 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
             }
         }
         position.store(&mut record[..4]);
-        if !slice.shape.is_empty() {
-            turn(slice, index, [load[4], load[5], load[6]], motion);
-        }
         if L::any(zero.greater(position) | position.at_least(sides)) {
             velocity.store(&mut slice.velocity[index]);
             wrap(slice, index, motion, result);
@@ -288,17 +290,58 @@ fn advance_range<L: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResu
     }
 }
 
-/// Turn an ellipsoid.
-fn turn(slice: &mut Slice, index: usize, torque: [f64; 3], motion: &StepMotion) {
+/// Turn ellipsoids, as many side by side as there are lanes where that many free ones follow each other.
+#[inline(always)]
+fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]], motion: &StepMotion) {
     let times = Rotation { kick: 0.5 * (motion.previous_time_step + motion.time_step), time_step: motion.time_step };
-    let (record, shape) = (&mut slice.record[index], &mut slice.shape[index]);
-    if record.inverse_mass > 0.0 {
-        let spins = times.advance(shape, trimmed(slice.spin[index]), torque, record.inverse_mass);
-        slice.spin[index] = padded(spins.half);
-        record.spin = spins.full;
-    } else {
-        times.advance_driven(shape, record.spin);
+    let mut place = 0;
+    while place < range.len() {
+        let index = range.start + place;
+        let group = index..(index + W::WIDTH).min(range.end);
+        let loads = &loads[place..];
+        place += group.len();
+        if group.len() == W::WIDTH && slice.record[group.clone()].iter().all(|record| record.inverse_mass > 0.0) {
+            turn_free::<W>(slice, index, loads, &times);
+            continue;
+        }
+        for (index, load) in group.zip(loads) {
+            let (record, shape) = (&slice.record[index], &mut slice.shape[index]);
+            if record.inverse_mass > 0.0 {
+                turn_free::<f64>(slice, index, std::slice::from_ref(load), &times);
+            } else {
+                shape.orientation = times.advance_driven(shape.orientation, record.spin);
+            }
+        }
     }
+}
+
+/// Turn the free ellipsoids from `index` on.
+#[inline(always)]
+fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times: &Rotation) {
+    let mut offsets = [0; BLOCK];
+    let (mut spin, mut torque) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
+    for lane in 0..W::WIDTH {
+        offsets[lane] = (lane * RECORD) as u32;
+        for axis in 0..3 {
+            spin[axis][lane] = slice.spin[index + lane][axis];
+            torque[axis][lane] = loads[lane][4 + axis];
+        }
+    }
+    let [a, b, c, _, w, x, y, z] = W::gather_shapes(&slice.shape[index..], &offsets);
+    let record = W::gather(&slice.record[index..], &offsets);
+    let body = Body {
+        semi_axes: [a, b, c],
+        inverse_mass: record[7],
+        orientation: [w, x, y, z],
+        spin: [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])],
+        torque: [W::load(&torque[0]), W::load(&torque[1]), W::load(&torque[2])],
+    };
+    let (orientation, Spins { half, full }) = times.advance(&body);
+    let shapes: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.shape[index..]);
+    W::scatter(orientation, shapes, SHAPE, 4);
+    W::scatter([half[0], half[1], half[2], W::splat(0.0)], slice.spin[index..].as_flattened_mut(), 4, 0);
+    let records: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.record[index..]);
+    W::scatter([full[0], full[1], full[2], record[11]], records, RECORD, 8);
 }
 
 /// Bring a particle back into the cell, count the images, and change its velocity with the face (BC).

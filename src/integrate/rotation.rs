@@ -1,7 +1,7 @@
 //! Rotation of ellipsoids in step with the leap-frog motion of their centres. Must not know where the
 //! torque comes from.
 
-use crate::state::shape::{Shape, normalised, principal_moments, product, rotation_matrix, to_body, to_space};
+use crate::state::shape::{Number, normalised, principal_moments, product, rotation_matrix, to_body, to_space};
 
 /// Times of one step.
 #[derive(Debug, Clone, Copy)]
@@ -12,17 +12,32 @@ pub struct Rotation {
     pub time_step: f64,
 }
 
+/// Ellipsoids as they turn, one or several side by side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Body<T> {
+    /// Semi-axes along the body's x, y, z \[m\].
+    pub semi_axes: [T; 3],
+    /// 1/m \[1/kg\], not 0.
+    pub inverse_mass: T,
+    /// Unit quaternion (w, x, y, z), body to space.
+    pub orientation: [T; 4],
+    /// Angular velocity of the last half step \[rad/s\].
+    pub spin: [T; 3],
+    /// Torque about the centre \[N m\].
+    pub torque: [T; 3],
+}
+
 /// Angular velocities after a step \[rad/s\], components in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spins {
+pub struct Spins<T> {
     /// Of the half step passed.
-    pub half: [f64; 3],
+    pub half: [T; 3],
     /// At the full step reached, extrapolated with the last torque as W (2.3) does for velocities.
-    pub full: [f64; 3],
+    pub full: [T; 3],
 }
 
 impl Rotation {
-    /// Turn a free ellipsoid by one step.
+    /// Turn a free ellipsoid by one step: its new orientation and angular velocities.
     ///
     /// ```text
     /// L(t+Δt/2) = L(t−Δt/2) + kick T(t)            angular momentum, components in space
@@ -30,7 +45,7 @@ impl Rotation {
     /// ```
     ///
     /// T \[N m\] torque about the centre, I_b \[kg m²\] the principal moments, q the orientation (body to
-    /// space), ω_b = I_b⁻¹ L_b. `spin` \[rad/s\] is that of the last half step, expressed as
+    /// space), ω_b = I_b⁻¹ L_b. The spin of the last half step is expressed as
     /// `I(q)⁻¹ L(t−Δt/2)` with the present orientation; so is the one returned, with the new orientation.
     /// For three equal semi-axes this is the leap-frog of spheres.
     ///
@@ -42,55 +57,75 @@ impl Rotation {
     /// Multiplication of quaternions instead of an integration of their components: Zhao, van Wachem 2013
     /// (doi:10.1007/s00707-013-0914-2); the splitting: Dullweber, Leimkuhler, McLachlan 1997
     /// (doi:10.1063/1.474310).
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn advance(&self, shape: &mut Shape, spin: [f64; 3], torque: [f64; 3], inverse_mass: f64) -> Spins {
+    pub fn advance<T: Number>(&self, body: &Body<T>) -> ([T; 4], Spins<T>) {
         // All per mass: the numbers stay far from underflow for small particles.
-        let moments = principal_moments(1.0, shape.semi_axes);
-        let acceleration = torque.map(|component| component * inverse_mass);
-        let rotation = rotation_matrix(shape.orientation);
-        let body_spin = to_body(&rotation, spin);
-        let before = to_space(&rotation, [0, 1, 2].map(|k| moments[k] * body_spin[k]));
-        let momentum = [0, 1, 2].map(|k| before[k] + self.kick * acceleration[k]);
+        let moments = principal_moments(T::number(1.0), body.semi_axes);
+        let acceleration = scaled(body.torque, body.inverse_mass);
+        let rotation = rotation_matrix(body.orientation);
+        let [x, y, z] = to_body(&rotation, body.spin);
+        let before = to_space(&rotation, [moments[0] * x, moments[1] * y, moments[2] * z]);
+        let momentum = kicked(before, acceleration, self.kick);
 
-        let turn = free_turn(to_body(&rotation, momentum), moments, self.time_step);
-        shape.orientation = normalised(product(shape.orientation, turn));
+        let turn = free_turn(to_body(&rotation, momentum), moments, T::number(self.time_step));
+        let orientation = normalised(product(body.orientation, turn));
 
-        let rotation = rotation_matrix(shape.orientation);
-        let spin_of = |momentum: [f64; 3]| {
-            let body = to_body(&rotation, momentum);
-            to_space(&rotation, [0, 1, 2].map(|k| body[k] / moments[k]))
-        };
-        let half = 0.5 * self.time_step;
-        Spins { half: spin_of(momentum), full: spin_of([0, 1, 2].map(|k| momentum[k] + half * acceleration[k])) }
+        let rotation = rotation_matrix(orientation);
+        let half = spin_of(momentum, &rotation, moments);
+        let full = spin_of(kicked(momentum, acceleration, 0.5 * self.time_step), &rotation, moments);
+        (orientation, Spins { half, full })
     }
 
-    /// Turn a body by a prescribed angular velocity \[rad/s\], constant in space.
+    /// Orientation of a body after a step at a prescribed angular velocity \[rad/s\], constant in space.
     #[inline]
-    pub fn advance_driven(&self, shape: &mut Shape, spin: [f64; 3]) {
+    #[must_use]
+    pub fn advance_driven(&self, orientation: [f64; 4], spin: [f64; 3]) -> [f64; 4] {
         let speed = (spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2]).sqrt();
         if speed > 0.0 {
             let [w, along] = half_angle(speed * self.time_step);
             let [x, y, z] = spin.map(|component| along * (component / speed));
-            shape.orientation = normalised(product([w, x, y, z], shape.orientation));
+            normalised(product([w, x, y, z], orientation))
+        } else {
+            orientation
         }
     }
 }
 
+#[inline(always)]
+fn scaled<T: Number>([x, y, z]: [T; 3], factor: T) -> [T; 3] {
+    [x * factor, y * factor, z * factor]
+}
+
+/// Momentum after a time under an acceleration.
+#[inline(always)]
+fn kicked<T: Number>([x, y, z]: [T; 3], acceleration: [T; 3], time: f64) -> [T; 3] {
+    let kick = T::number(time);
+    [x + kick * acceleration[0], y + kick * acceleration[1], z + kick * acceleration[2]]
+}
+
+/// Angular velocity of a momentum, both in space.
+#[inline(always)]
+fn spin_of<T: Number>(momentum: [T; 3], rotation: &[[T; 3]; 3], moments: [T; 3]) -> [T; 3] {
+    let [x, y, z] = to_body(rotation, momentum);
+    to_space(rotation, [x / moments[0], y / moments[1], z / moments[2]])
+}
+
 /// The turn of a free body over a time, as a quaternion in the body's axes, from its angular momentum in
 /// them and its principal moments.
-#[inline]
-fn free_turn(momentum: [f64; 3], moments: [f64; 3], time: f64) -> [f64; 4] {
+#[inline(always)]
+fn free_turn<T: Number>(momentum: [T; 3], moments: [T; 3], time: T) -> [T; 4] {
     let mut momentum = momentum;
-    let mut turn = [1.0, 0.0, 0.0, 0.0];
-    let times = moments.map(|moment| time / moment);
+    let (zero, one) = (T::number(0.0), T::number(1.0));
+    let mut turn = [one, zero, zero, zero];
+    let times = [time / moments[0], time / moments[1], time / moments[2]];
     for (axis, share) in [(0, 0.5), (1, 0.5), (2, 1.0), (1, 0.5), (0, 0.5)] {
-        let [cos, sin] = half_angle(share * momentum[axis] * times[axis]);
-        let mut part = [cos, 0.0, 0.0, 0.0];
+        let [cos, sin] = half_angle(T::number(share) * momentum[axis] * times[axis]);
+        let mut part = [cos, zero, zero, zero];
         part[1 + axis] = sin;
         turn = product(turn, part);
         // The momentum stands still in space: in the body's axes it turns back.
-        let (c, s) = (cos * cos - sin * sin, 2.0 * sin * cos);
+        let (c, s) = (cos * cos - sin * sin, T::number(2.0) * sin * cos);
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         let [p, q] = [momentum[next], momentum[last]];
         momentum[next] = c * p + s * q;
@@ -102,19 +137,20 @@ fn free_turn(momentum: [f64; 3], moments: [f64; 3], time: f64) -> [f64; 4] {
 /// Cosine and sine of half an angle, from the tangent of its quarter to the third order: exactly on the
 /// unit circle, the angle to the fifth order. A turn about one axis by any odd function of the momentum
 /// along that axis leaves the scheme symplectic and symmetric.
-#[inline]
-fn half_angle(angle: f64) -> [f64; 2] {
-    let quarter = 0.25 * angle;
-    let tangent = quarter + quarter * quarter * quarter * (1.0 / 3.0);
+#[inline(always)]
+fn half_angle<T: Number>(angle: T) -> [T; 2] {
+    let one = T::number(1.0);
+    let quarter = T::number(0.25) * angle;
+    let tangent = quarter + quarter * quarter * quarter * T::number(1.0 / 3.0);
     let square = tangent * tangent;
-    let inverse = 1.0 / (1.0 + square);
-    [(1.0 - square) * inverse, 2.0 * tangent * inverse]
+    let inverse = one / (one + square);
+    [(one - square) * inverse, T::number(2.0) * tangent * inverse]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::shape::{UPRIGHT, rotational_energy};
+    use crate::state::shape::{Shape, UPRIGHT, rotational_energy};
 
     const MASS: f64 = 5.0;
 
@@ -129,12 +165,22 @@ mod tests {
         to_space(&rotation, [0, 1, 2].map(|k| moments[k] * body[k]))
     }
 
+    impl Rotation {
+        fn turn(&self, shape: &mut Shape, spin: [f64; 3], torque: [f64; 3]) -> Spins<f64> {
+            let Shape { semi_axes, orientation, .. } = *shape;
+            let (orientation, spins) =
+                self.advance(&Body { semi_axes, inverse_mass: 1.0 / MASS, orientation, spin, torque });
+            shape.orientation = orientation;
+            spins
+        }
+    }
+
     /// A free body after `steps` steps.
     fn free(semi_axes: [f64; 3], spin: [f64; 3], time: f64, steps: u32) -> (Shape, [f64; 3]) {
         let step = Rotation { kick: 0.0, time_step: time / f64::from(steps) };
         let (mut shape, mut spin) = (body(semi_axes), spin);
         for _ in 0..steps {
-            spin = step.advance(&mut shape, spin, [0.0; 3], 1.0 / MASS).half;
+            spin = step.turn(&mut shape, spin, [0.0; 3]).half;
         }
         (shape, spin)
     }
@@ -220,7 +266,7 @@ mod tests {
         let (energy, momentum) = (rotational_energy(MASS, &shape, spin), angular_momentum(&shape, spin));
         let mut largest = [0.0_f64; 2];
         for count in 0..1_000_000_u32 {
-            now = step.advance(&mut shape, now, [0.0; 3], 1.0 / MASS).half;
+            now = step.turn(&mut shape, now, [0.0; 3]).half;
             let late = usize::from(count >= 500_000);
             largest[late] = largest[late].max((rotational_energy(MASS, &shape, now) / energy - 1.0).abs());
         }
@@ -241,7 +287,7 @@ mod tests {
             let step = Rotation { kick: 0.0, time_step: 30.0 / f64::from(steps) };
             let (mut shape, mut now, mut largest) = (body(axes), spin, 0.0_f64);
             for _ in 0..steps {
-                now = step.advance(&mut shape, now, [0.0; 3], 1.0 / MASS).half;
+                now = step.turn(&mut shape, now, [0.0; 3]).half;
                 largest = largest.max((rotational_energy(MASS, &shape, now) / energy - 1.0).abs());
             }
             largest
@@ -256,7 +302,7 @@ mod tests {
         let (mut shape, torque) = (body([3.0, 2.0, 1.0]), [1.0, -2.0, 0.5]);
         let mut spins = Spins { half: [0.0; 3], full: [0.0; 3] };
         for _ in 0..200 {
-            spins = step.advance(&mut shape, spins.half, torque, 1.0 / MASS);
+            spins = step.turn(&mut shape, spins.half, torque);
         }
         let expected = torque.map(|component| 2.0 * component);
         assert!(distance(angular_momentum(&shape, spins.half), expected) < 1e-13);
@@ -269,7 +315,7 @@ mod tests {
         let step = Rotation { kick: 0.0, time_step: 1e-3 };
         let mut shape = body([3.0, 2.0, 1.0]);
         for _ in 0..1000 {
-            step.advance_driven(&mut shape, [0.0, 0.3, 0.4]);
+            shape.orientation = step.advance_driven(shape.orientation, [0.0, 0.3, 0.4]);
         }
         let [w, s] = [libm::cos(0.25), libm::sin(0.25)];
         let expected = [w, 0.0, 0.6 * s, 0.8 * s];

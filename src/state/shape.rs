@@ -3,6 +3,16 @@
 
 use bytemuck::{Pod, Zeroable};
 use std::f64::consts::PI;
+use std::ops::{Add, Div, Mul, Sub};
+
+/// What the functions of rotation compute with: an `f64`, or several side by side ([`crate::force::lane::Lane`]).
+pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+    /// A constant.
+    fn number(value: f64) -> Self;
+    /// Square root.
+    #[must_use]
+    fn root(self) -> Self;
+}
 
 /// What the contact pass reads of an ellipsoid beside its [`super::particles::Record`]: one cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -43,10 +53,12 @@ pub fn ellipsoid_mass(semi_axes: [f64; 3], density: f64) -> f64 {
 }
 
 /// Principal moments of inertia about the body's x, y, z: `I_x = m (b² + c²)/5` and so on \[kg m²\].
+#[inline(always)]
 #[must_use]
-pub fn principal_moments(mass: f64, semi_axes: [f64; 3]) -> [f64; 3] {
-    let [x, y, z] = semi_axes.map(|axis| axis * axis);
-    [y + z, z + x, x + y].map(|sum| 0.2 * mass * sum)
+pub fn principal_moments<T: Number>(mass: T, semi_axes: [T; 3]) -> [T; 3] {
+    let [a, b, c] = semi_axes;
+    let (x, y, z, share) = (a * a, b * b, c * c, T::number(0.2) * mass);
+    [share * (y + z), share * (z + x), share * (x + y)]
 }
 
 /// Whether the semi-axes are those of a sphere.
@@ -71,35 +83,44 @@ pub fn smallest_semi_axis(semi_axes: [f64; 3]) -> f64 {
 /// `x_space = R x_body`.
 #[inline(always)]
 #[must_use]
-pub fn rotation_matrix(orientation: [f64; 4]) -> [[f64; 3]; 3] {
+pub fn rotation_matrix<T: Number>(orientation: [T; 4]) -> [[T; 3]; 3] {
     let [w, x, y, z] = orientation;
+    let one = T::number(1.0);
     // The length is 1 but for rounding; without it momenta that turn to and fro drift.
-    let two = 2.0 / (w * w + x * x + y * y + z * z);
+    let two = T::number(2.0) / (w * w + x * x + y * y + z * z);
     [
-        [1.0 - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)],
-        [two * (x * y + w * z), 1.0 - two * (x * x + z * z), two * (y * z - w * x)],
-        [two * (x * z - w * y), two * (y * z + w * x), 1.0 - two * (x * x + y * y)],
+        [one - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)],
+        [two * (x * y + w * z), one - two * (x * x + z * z), two * (y * z - w * x)],
+        [two * (x * z - w * y), two * (y * z + w * x), one - two * (x * x + y * y)],
     ]
 }
 
 /// Components in space of a vector given along the body's axes, `R v`.
 #[inline(always)]
 #[must_use]
-pub fn to_space(rotation: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| rotation[k][0] * v[0] + rotation[k][1] * v[1] + rotation[k][2] * v[2])
+pub fn to_space<T: Number>([x, y, z]: &[[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+    [
+        x[0] * v[0] + x[1] * v[1] + x[2] * v[2],
+        y[0] * v[0] + y[1] * v[1] + y[2] * v[2],
+        z[0] * v[0] + z[1] * v[1] + z[2] * v[2],
+    ]
 }
 
 /// Components along the body's axes of a vector given in space, `Rᵀ v`.
 #[inline(always)]
 #[must_use]
-pub fn to_body(rotation: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| rotation[0][k] * v[0] + rotation[1][k] * v[1] + rotation[2][k] * v[2])
+pub fn to_body<T: Number>([x, y, z]: &[[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+    [
+        x[0] * v[0] + y[0] * v[1] + z[0] * v[2],
+        x[1] * v[0] + y[1] * v[1] + z[1] * v[2],
+        x[2] * v[0] + y[2] * v[1] + z[2] * v[2],
+    ]
 }
 
 /// Product of quaternions: turn by `q`, then by `p`, as seen from space.
 #[inline(always)]
 #[must_use]
-pub fn product(p: [f64; 4], q: [f64; 4]) -> [f64; 4] {
+pub fn product<T: Number>(p: [T; 4], q: [T; 4]) -> [T; 4] {
     [
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
         p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
@@ -111,9 +132,9 @@ pub fn product(p: [f64; 4], q: [f64; 4]) -> [f64; 4] {
 /// The same orientation with unit length.
 #[inline(always)]
 #[must_use]
-pub fn normalised(q: [f64; 4]) -> [f64; 4] {
-    let norm = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
-    q.map(|c| c / norm)
+pub fn normalised<T: Number>([w, x, y, z]: [T; 4]) -> [T; 4] {
+    let norm = (w * w + x * x + y * y + z * z).root();
+    [w / norm, x / norm, y / norm, z / norm]
 }
 
 /// Rotational energy `½ ω·I ω` of a body that spins with ω \[rad/s\] (components in space) \[J\].

@@ -1,7 +1,7 @@
 //! Shape of an elliptical contact from the radii tensors of the two surfaces: R_e, f_1, f_2.
 
 use crate::force::lane::Lane;
-use crate::force::lane::elementary::{exp, ln};
+use crate::force::lane::elementary::{exp, ln, polynomial};
 
 /// Shape of the gap between two surfaces near the point where they touch, `A x² + B y²`, A ≤ B.
 #[derive(Debug, Clone, Copy)]
@@ -77,11 +77,8 @@ fn factor<L: Lane>(log: L, log_log: L, [inner, log_inner]: [f64; 2], outer: f64)
     ];
     let t = L::splat(inner) * log;
     let square = t * t;
-    let mut series = L::splat(0.0);
-    for coefficient in SERIES.iter().rev() {
-        series = series * square + L::splat(*coefficient);
-    }
-    let log_excess = log_log + (L::splat(log_inner) + (L::splat(0.5) * t + square * series));
+    let series = square * polynomial(square, &SERIES);
+    let log_excess = log_log + (L::splat(log_inner) + (L::splat(0.5) * t + series));
     L::splat(1.0) - exp((L::splat(outer) * log_excess).max(L::splat(-700.0)))
 }
 

@@ -9,8 +9,14 @@ pub const MAX_ITERATIONS: usize = 100;
 /// A step \[rad\] below which Newton's quadratic convergence leaves nothing to gain.
 const LAST_STEP: f64 = 3e-7;
 
+/// A step \[rad\] so short that surface points follow it to rounding by their first derivative, and curvatures stay.
+const SETTLED_STEP: f64 = 1e-9;
+
 /// Longest step \[rad\].
 const LONGEST_STEP: f64 = 0.5;
+
+/// Product of the curvatures over their squared sum below which Newton's step is not taken unexamined.
+const FLATTEST: f64 = 1e-9;
 
 /// Shortest step \[rad\] along a direction in which the overlap has a maximum.
 const KICK: f64 = 0.05;
@@ -93,7 +99,15 @@ impl<L: Lane> Ellipsoids<L> {
         let mut active = now.overlap.greater(bound);
         let mut evaluations = 1;
         while L::any(active) && evaluations < MAX_ITERATIONS {
-            let step = Step::new(&now, self.branch, damping);
+            let step = Step::new(&now, self.branch, damping, active);
+            let settled = active & step.convex & L::splat(SETTLED_STEP * SETTLED_STEP).at_least(step.square);
+            if L::any(settled) {
+                now = Found::select(settled, &now.settled(&step), &now);
+                active = active & !settled;
+                if !L::any(active) {
+                    break;
+                }
+            }
             let turned =
                 add(now.normal, add(scale(now.tangents[0], step.along[0]), scale(now.tangents[1], step.along[1])));
             let next = self.along(scale(turned, L::splat(1.0) / dot(turned, turned).sqrt()));
@@ -184,18 +198,52 @@ struct Step<L: Lane> {
     gain: L,
     /// Both curvatures are positive and undamped.
     convex: L::Mask,
-    /// Larger curvature.
+    /// Larger curvature, or the sum of both where both are positive.
     stiffness: L,
 }
 
 impl<L: Lane> Step<L> {
+    /// The step of the `active` lanes. Where both curvatures are positive and undamped it is Newton's, which needs no
+    /// principal directions; by lane, so that a pair's bits do not hang on the pairs beside it.
     #[inline(always)]
-    fn new(now: &Found<L>, branch: Vector<L>, damping: L) -> Self {
-        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
+    fn new(now: &Found<L>, branch: Vector<L>, damping: L, active: L::Mask) -> Self {
+        let zero = L::splat(0.0);
         let rest = sub(sub(now.first_point, now.second_point), branch);
         let gradient = [dot(now.tangents[0], rest), dot(now.tangents[1], rest)];
         let [wi, wj] = &now.radii;
-        let (h11, h22, h12) = (wi[0] + wj[0] - now.overlap, wi[1] + wj[1] - now.overlap, wi[2] + wj[2]);
+        let hessian = [wi[0] + wj[0] - now.overlap, wi[1] + wj[1] - now.overlap, wi[2] + wj[2]];
+        let [h11, h22, h12] = hessian;
+        let (trace, determinant) = (h11 + h22, h11 * h22 - h12 * h12);
+        let inverse = L::splat(1.0) / determinant;
+        let along =
+            [(h12 * gradient[1] - h22 * gradient[0]) * inverse, (h12 * gradient[0] - h11 * gradient[1]) * inverse];
+        let square = along[0] * along[0] + along[1] * along[1];
+        let convex = h11.greater(zero)
+            & determinant.greater(L::splat(FLATTEST) * (trace * trace))
+            & zero.at_least(damping)
+            & L::splat(LONGEST_STEP * LONGEST_STEP).at_least(square);
+        let gain = -(along[0] * gradient[0] + along[1] * gradient[1]);
+        let newton = Self { along, square, gain, convex, stiffness: trace };
+        if !L::any(active & !convex) {
+            return newton;
+        }
+        let other = Self::along_principal(gradient, hessian, damping);
+        Self {
+            along: [
+                L::select(convex, newton.along[0], other.along[0]),
+                L::select(convex, newton.along[1], other.along[1]),
+            ],
+            square: L::select(convex, newton.square, other.square),
+            gain: L::select(convex, newton.gain, other.gain),
+            convex: convex | other.convex,
+            stiffness: L::select(convex, newton.stiffness, other.stiffness),
+        }
+    }
+
+    /// The step `−g/(|λ| + μ)` in each principal direction, no longer than [`LONGEST_STEP`].
+    #[inline(always)]
+    fn along_principal(gradient: [L; 2], [h11, h22, h12]: [L; 3], damping: L) -> Self {
+        let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
         // Principal directions: of the two formulas for the same vector the longer one.
         let (mean, difference) = (half * (h11 + h22), half * (h11 - h22));
         let radius = (difference * difference + h12 * h12).sqrt();
@@ -251,6 +299,27 @@ fn choose<L: Lane>(mask: L::Mask, yes: &[L; 3], no: &[L; 3]) -> [L; 3] {
 }
 
 impl<L: Lane> Found<L> {
+    /// After a step too short for another evaluation: `n + t`, `p ± W t`, o less half of what the gradient promises.
+    #[inline(always)]
+    fn settled(&self, step: &Step<L>) -> Self {
+        let half = L::splat(0.5);
+        let on_surface = |along: [L; 2]| add(scale(self.tangents[0], along[0]), scale(self.tangents[1], along[1]));
+        let [x, y] = step.along;
+        let [first, second] = [self.radii[0], self.radii[1]];
+        let turned = add(self.normal, on_surface(step.along));
+        Self {
+            // One step of Newton's for the length, which is 1 but for rounding.
+            normal: scale(turned, L::splat(1.5) - half * dot(turned, turned)),
+            overlap: self.overlap - half * step.gain,
+            first_point: add(self.first_point, on_surface([first[0] * x + first[2] * y, first[2] * x + first[1] * y])),
+            second_point: sub(
+                self.second_point,
+                on_surface([second[0] * x + second[2] * y, second[2] * x + second[1] * y]),
+            ),
+            ..*self
+        }
+    }
+
     /// Lane by lane `yes` or `no`.
     #[inline(always)]
     #[must_use]

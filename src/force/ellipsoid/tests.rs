@@ -3,10 +3,10 @@
 
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, MAX_ITERATIONS};
-use super::touch::{self, Shapes, Surroundings};
+use super::touch::{self, Shapes};
 use super::*;
 use crate::contact::shift::{ShiftTable, encode};
-use crate::force::geometry::{self, Bodies, CellMotion};
+use crate::force::geometry::{self, CellMotion, Relative};
 use crate::force::lane::portable::Portable;
 use crate::force::lane::{add, cross, scale, sub};
 use crate::state::particles::{RECORD, Record};
@@ -364,20 +364,21 @@ struct Moving {
 }
 
 impl Moving {
-    fn at(&self, time: f64) -> (Bodies<f64>, Shapes<f64>) {
+    fn at(&self, time: f64) -> (Record, Shapes<f64>) {
         // A turn about the spin by |ω| t.
         let rate = dot(self.spin, self.spin).sqrt();
         let (sine, cosine) = libm::sincos(0.5 * rate * time);
         let axis = scale(self.spin, sine / rate);
         let turned = crate::state::shape::product([cosine, axis[0], axis[1], axis[2]], self.orientation);
-        let bodies = Bodies {
+        let record = Record {
             position: add(self.position, scale(self.velocity, time)),
             radius: 1.4e-6,
             velocity: self.velocity,
             inverse_mass: 1.0,
             spin: self.spin,
+            radius_again: 1.4e-6,
         };
-        (bodies, Shapes { semi_axes: self.semi_axes, mean_radius: 1e-6, orientation: turned })
+        (record, Shapes { semi_axes: self.semi_axes, mean_radius: 1e-6, orientation: turned })
     }
 }
 
@@ -385,7 +386,6 @@ impl Moving {
 fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodies() {
     let mut random = Random::new(8);
     let motion = still();
-    let surroundings = Surroundings { motion: &motion, range: 0.0 };
     for _ in 0..500 {
         let (pair, slow) = random_pair(&mut random);
         let mut body = |position, semi_axes, orientation| Moving {
@@ -398,13 +398,13 @@ fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodie
         let bodies = [body([0.0; 3], slow.axes[0], slow.turns[0]), body(pair.branch, slow.axes[1], slow.turns[1])];
         let at = |time: f64| {
             let [(a, s), (b, t)] = [bodies[0].at(time), bodies[1].at(time)];
-            touch::ellipsoids(
-                &[a, b],
-                &[s, t],
-                [pair.common_normal([0.0; 3], [0.0; 3], 0.0).found.normal, [0.0; 3]],
-                &[encode([0; 3])],
-                &surroundings,
-            )
+            let (records, places): (_, [&[u32]; 2]) = ([a, b], [&[0], &[RECORD as u32]]);
+            let bodies = Relative {
+                relative_spin: f64::relative_spin(&records, places),
+                ..geometry::relative(&records, places, &[encode([0; 3])], &motion)
+            };
+            let normal = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found.normal;
+            touch::ellipsoids(&bodies, &[s, t], [normal, [0.0; 3]], 0.0)
         };
         let (now, h) = (at(0.0).pair, 1e-12);
         let slope = (at(h).pair.touch.overlap - at(-h).pair.touch.overlap) / (2.0 * h);

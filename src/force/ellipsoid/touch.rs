@@ -6,7 +6,7 @@ use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, Found};
 use super::{radii_tensor, shape_tensor, support, tangents};
 use crate::contact::section::{BLOCK, CacheLine, Section};
-use crate::force::geometry::{self, Bodies, CellMotion, PairTouch, TOUCH_TOLERANCE, image};
+use crate::force::geometry::{self, CellMotion, PairTouch, Relative, TOUCH_TOLERANCE};
 use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
@@ -42,9 +42,13 @@ const NUMBERS: usize = 33;
 pub struct TouchBlock([[f64; BLOCK]; NUMBERS]);
 
 impl TouchBlock {
-    /// The touches of a block of a section. `normals`: where in the section's memory columns the stored normal is.
-    #[must_use]
-    pub fn new(
+    /// No touches.
+    pub const EMPTY: Self = Self([[0.0; BLOCK]; NUMBERS]);
+
+    /// Take in the touches of a block of a section. `normals`: where in the section's memory columns the stored normal
+    /// is.
+    pub fn take(
+        &mut self,
         simd: Simd,
         surroundings: &Surroundings,
         records: &[Record],
@@ -52,19 +56,17 @@ impl TouchBlock {
         section: &Section,
         block: usize,
         normals: usize,
-    ) -> Self {
-        let mut touches = Self([[0.0; BLOCK]; NUMBERS]);
+    ) {
         let from = Source { surroundings, records, shapes, section, block, normals };
         match simd {
             // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512 => unsafe { touches.fill_avx512(&from) },
+            Simd::Avx512 => unsafe { self.fill_avx512(&from) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2 => unsafe { touches.fill_avx2(&from) },
-            _ => touches.fill::<f64>(&from),
+            Simd::Avx2 => unsafe { self.fill_avx2(&from) },
+            _ => self.fill::<f64>(&from),
         }
-        touches
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -124,21 +126,22 @@ impl Source<'_> {
         let lanes = place..place + L::WIDTH;
         let (first, second) = (&self.section.first[lanes.clone()], &self.section.second[lanes.clone()]);
         let shapes = [Shapes::<L>::gather(self.shapes, first), Shapes::gather(self.shapes, second)];
-        let codes = &self.section.shift[lanes];
-        let motion = self.surroundings.motion;
+        let bodies = Relative {
+            relative_spin: L::relative_spin(self.records, [first, second]),
+            ..geometry::relative(self.records, [first, second], &self.section.shift[lanes], self.surroundings.motion)
+        };
         let round = shapes[0].is_sphere() & shapes[1].is_sphere();
         if !L::any(!round) {
-            return EllipsoidTouch::of_spheres(geometry::spheres(self.records, [first, second], codes, motion));
+            return EllipsoidTouch::of_spheres(geometry::touch(&bodies));
         }
-        let bodies = [Bodies::gather(self.records, first), Bodies::gather(self.records, second)];
         let memory = self.block * self.section.columns + self.normals;
         let stored = vector_at(&self.section.memory[memory..memory + 3], lane);
         let hint = self.section.hints.get(self.block).map_or([L::splat(0.0); 3], |hint| vector_at(hint, lane));
-        let touch = ellipsoids(&bodies, &shapes, [stored, hint], codes, self.surroundings);
+        let touch = ellipsoids(&bodies, &shapes, [stored, hint], self.surroundings.range);
         if !L::any(round) {
             return touch;
         }
-        let of_spheres = EllipsoidTouch::of_spheres(geometry::spheres(self.records, [first, second], codes, motion));
+        let of_spheres = EllipsoidTouch::of_spheres(geometry::touch(&bodies));
         // By lane and not by block: a pair's bits must not hang on the pairs beside it.
         let mut numbers = touch.numbers();
         for (number, of_spheres) in numbers.iter_mut().zip(of_spheres.numbers()) {
@@ -185,41 +188,39 @@ impl<L: Lane> Shapes<L> {
     }
 }
 
-/// Touch of two ellipsoids, the second in the image of its packed shift, warm from the stored normal or, to see that
-/// they do not touch, from a hint ([`Ellipsoids::common_normal`]). The contact
-/// point is the midpoint of the two surface points. δ̇ and the slip velocity are those of the material points there;
-/// m_eff is that of the centres. NaN counts as touching, so that it is found.
+/// Touch of two ellipsoids, warm from the stored normal or, to see that they do not touch, from a hint
+/// ([`Ellipsoids::common_normal`]); `range` as in [`Surroundings`]. The contact point is the midpoint of the two surface
+/// points p_i, p_j. δ̇ and the slip velocity are those of the material points there; m_eff is that of the centres. NaN
+/// counts as touching, so that it is found.
+///
+/// With `r_i = ½ (d + p_i + p_j)` the bodies turn past each other at the contact point with
+/// `ω_j × (r_i − d) − ω_i × r_i = ½ [(ω_j − ω_i) × (p_i + p_j) − (ω_i + ω_j) × d]`.
 ///
 /// # Source
 /// PHYSICS.md "Ellipsoid geometry" and section 1.
 #[inline(always)]
 #[must_use]
 pub fn ellipsoids<L: Lane>(
-    [a, b]: &[Bodies<L>; 2],
+    bodies: &Relative<L>,
     shapes: &[Shapes<L>; 2],
     [stored, hint]: [Vector<L>; 2],
-    codes: &[u16],
-    surroundings: &Surroundings,
+    range: f64,
 ) -> EllipsoidTouch<L> {
-    let motion = surroundings.motion;
-    let branch = sub(add(b.position, image(&motion.shift, codes)), a.position);
+    let branch = bodies.branch;
     let min_radius = shapes[0].smallest().min(shapes[1].smallest());
     let [one, other] = shapes;
     let tensors = [shape_tensor(one.semi_axes, one.orientation), shape_tensor(other.semi_axes, other.orientation)];
-    let bound = L::splat(-surroundings.range) * min_radius;
+    let bound = L::splat(-range) * min_radius;
     let found: Found<L> = Ellipsoids { tensors, branch }.common_normal(stored, hint, bound).found;
     let (normal, overlap) = (found.normal, found.overlap);
     let heights = dot(normal, sub(found.first_point, found.second_point));
     let ellipse = Ellipse::new(&found.radii);
 
-    let [gx, gy, gz] = motion.gradient;
-    let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
-    let imposed_velocity = add(image(&motion.shift_velocity, codes), affine);
     let half = L::splat(0.5);
-    let arm = scale(add(add(found.first_point, branch), found.second_point), half);
-    let arms = [arm, sub(arm, branch)];
-    let turning = sub(cross(b.spin, arms[1]), cross(a.spin, arms[0]));
-    let velocity = add(add(sub(b.velocity, a.velocity), imposed_velocity), turning);
+    let points = add(found.first_point, found.second_point);
+    let arms = [scale(add(points, branch), half), scale(sub(points, branch), half)];
+    let turning = scale(sub(cross(bodies.relative_spin, points), cross(bodies.spin_sum, branch)), half);
+    let velocity = add(bodies.velocity, turning);
     let approach = dot(velocity, normal);
     let touch = Touch {
         overlap,
@@ -228,17 +229,17 @@ pub fn ellipsoids<L: Lane>(
         radius_factor: ellipse.radius_factor,
         overlap_factor: ellipse.overlap_factor,
         size: shapes[0].mean_radius + shapes[1].mean_radius,
-        effective_mass: L::splat(1.0) / (a.inverse_mass + b.inverse_mass),
+        effective_mass: L::splat(1.0) / bodies.inverse_masses,
         normal,
         slip_velocity: sub(velocity, scale(normal, approach)),
-        relative_spin: sub(b.spin, a.spin),
-        spin_about_normal: half * dot(add(a.spin, b.spin), normal),
+        relative_spin: bodies.relative_spin,
+        spin_about_normal: half * dot(bodies.spin_sum, normal),
     };
     let pair = PairTouch {
         touching: !(L::splat(TOUCH_TOLERANCE) * heights).at_least(overlap),
         touch,
         branch,
-        imposed_velocity,
+        imposed_velocity: bodies.imposed_velocity,
         arm_first: dot(arms[0], normal),
         arm_second: -dot(arms[1], normal),
         min_radius,

@@ -19,11 +19,7 @@ pub fn ln<L: Lane>(x: L) -> L {
     let m = L::select(large, half * m, m);
     let e = L::select(large, e + one, e);
     let s = (m - one) / (m + one);
-    let square = s * s;
-    let mut series = L::splat(1.0 / 21.0);
-    for k in (0..10).rev() {
-        series = series * square + L::splat(1.0 / f64::from(2 * k + 1));
-    }
+    let series = polynomial(s * s, &ARTANH);
     e * L::splat(LN_2_HIGH) + (e * L::splat(LN_2_LOW) + (s + s) * series)
 }
 
@@ -37,11 +33,60 @@ pub fn exp<L: Lane>(x: L) -> L {
     let round = L::splat(1.5 * super::WHOLE);
     let k = (x * L::splat(LOG2_E) + round) - round;
     let r = (x - k * L::splat(LN_2_HIGH)) - k * L::splat(LN_2_LOW);
-    let mut series = L::splat(1.0);
-    for n in (1..14).rev() {
-        series = series * (r * L::splat(1.0 / f64::from(n))) + L::splat(1.0);
+    polynomial(r, &EXPONENTIAL) * k.power_of_two()
+}
+
+/// Of `artanh(s)/s` in powers of s²: `1/(2k + 1)`.
+const ARTANH: [f64; 11] = {
+    let (mut series, mut k) = ([0.0; 11], 0);
+    while k < series.len() {
+        series[k] = 1.0 / (2 * k + 1) as f64;
+        k += 1;
     }
-    series * k.power_of_two()
+    series
+};
+
+/// Of `e^r`: `1/k!`.
+const EXPONENTIAL: [f64; 14] = {
+    let (mut series, mut k) = ([1.0; 14], 1);
+    while k < series.len() {
+        series[k] = series[k - 1] / k as f64;
+        k += 1;
+    }
+    series
+};
+
+/// `c_0 + c_1 x + c_2 x² + …` of at most sixteen terms, neighbours joined first (Estrin's scheme): the shortest chain of
+/// operations that wait for each other.
+#[inline(always)]
+#[must_use]
+pub fn polynomial<L: Lane, const N: usize>(x: L, coefficients: &[f64; N]) -> L {
+    const { assert!(N <= 16) };
+    let mut terms = [L::splat(0.0); 16];
+    for (term, coefficient) in terms.iter_mut().zip(coefficients) {
+        *term = L::splat(*coefficient);
+    }
+    let square = x * x;
+    let fourth = square * square;
+    let terms: [L; 8] = joined(&terms, N, x);
+    let terms: [L; 4] = joined(&terms, N.div_ceil(2), square);
+    let terms: [L; 2] = joined(&terms, N.div_ceil(4), fourth);
+    let terms: [L; 1] = joined(&terms, N.div_ceil(8), fourth * fourth);
+    terms[0]
+}
+
+/// Each two of the first `count` terms as one, `t_{2k} + t_{2k+1} power`.
+#[inline(always)]
+fn joined<L: Lane, const HALF: usize>(terms: &[L], count: usize, power: L) -> [L; HALF] {
+    let mut pairs = [L::splat(0.0); HALF];
+    for (k, pair) in pairs.iter_mut().enumerate() {
+        if 2 * k + 1 < count {
+            *pair = terms[2 * k] + terms[2 * k + 1] * power;
+        } else if 2 * k < count {
+            *pair = terms[2 * k];
+        }
+    }
+    pairs
 }
 
 #[cfg(test)]

@@ -49,10 +49,10 @@ impl<C: ContactLaw> LawPass<C> {
         self.ellipsoids::<F64x8>(job)
     }
 
-    fn touches(&self, input: &PassInput, bodies: BodyData, section: &Section, block: usize) -> TouchBlock {
+    fn take(&self, touches: &mut TouchBlock, input: &PassInput, bodies: BodyData, section: &Section, block: usize) {
         let range = if C::LASTS { self.law.range() } else { 0.0 };
         let surroundings = Surroundings { motion: input.motion, range };
-        TouchBlock::new(input.simd, &surroundings, bodies.records, bodies.shapes, section, block, C::MEMORY)
+        touches.take(input.simd, &surroundings, bodies.records, bodies.shapes, section, block, C::MEMORY);
     }
 
     #[inline(always)]
@@ -62,8 +62,9 @@ impl<C: ContactLaw> LawPass<C> {
         let limit = L::splat(input.max_overlap_fraction);
         let start = blocks.start * BLOCK;
         section.hints.resize(section.blocks(), [CacheLine([0.0; BLOCK]); 3]);
+        let mut touches = TouchBlock::EMPTY;
         for block in blocks {
-            let touches = self.touches(input, bodies, section, block);
+            self.take(&mut touches, input, bodies, section, block);
             section.hints[block] = touches.normals();
             let memory = &mut section.memory[block * section.columns..(block + 1) * section.columns];
             for lane in (0..BLOCK).step_by(L::WIDTH) {
@@ -164,13 +165,18 @@ impl<C: ContactLaw> LawPass<C> {
     ) {
         let line = observed.line;
         let start = blocks.start * BLOCK;
+        let mut touches = TouchBlock::EMPTY;
+        let walls = section.partners == Partners::Wall;
         for block in blocks {
-            let touches = (section.partners != Partners::Wall).then(|| self.touches(input, bodies, section, block));
+            if !walls {
+                self.take(&mut touches, input, bodies, section, block);
+            }
             for place in block * BLOCK..((block + 1) * BLOCK).min(section.count) {
                 observed.line = line + place - start;
-                let touch = match &touches {
-                    Some(touches) => touches.load::<f64>(place % BLOCK),
-                    None => wall_touch(input, bodies, section, place),
+                let touch = if walls {
+                    wall_touch(input, bodies, section, place)
+                } else {
+                    touches.load::<f64>(place % BLOCK)
                 };
                 self.observe_ellipsoid(&touch, section, place, observed);
             }
