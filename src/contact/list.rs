@@ -272,7 +272,9 @@ impl ContactList {
             for chunk in 0..strip.chunks() {
                 let particles = strip.chunk(chunk);
                 let ends = &ends[offsets[particles.start] as usize..offsets[particles.end] as usize];
-                strip.kept_reads.extend(ends.iter().map(|end| end.line()).filter(|line| line < kept).map(|line| line as u32));
+                strip
+                    .kept_reads
+                    .extend(ends.iter().map(|end| end.line()).filter(|line| line < kept).map(|line| line as u32));
                 strip.kept_read_ends.push(strip.kept_reads.len() as u32);
             }
         }

@@ -7,10 +7,10 @@ use super::gather::{ChunkEnds, Lines};
 use super::rotation::{Body, Rotation, Spins};
 use crate::contact::list::CHUNK;
 use crate::contact::section::BLOCK;
-#[cfg(target_arch = "x86_64")]
-use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::lane::portable::Portable;
 use crate::force::lane::{Lane, SHAPE, prefetch};
+#[cfg(target_arch = "x86_64")]
+use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, RECORD, Record, padded, trimmed};

@@ -1,16 +1,17 @@
 //! The loop around the laws where there are ellipsoids: geometry a block at a time, then the law, then lines
 //! with both torques.
 
-use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, PassInput, first_excess};
+use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, NEAREST_CACHES, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::composition::MAX_MEMORY;
 use crate::force::ellipsoid::touch::{self, EllipsoidTouch, Surroundings, TouchBlock};
-use crate::force::lane::{Lane, add, cross, dot, scale, sub};
+use crate::force::lane::{Lane, add, cross, dot, prefetch, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{Column, ContactLaw};
 use crate::force::observe::Observed;
 use crate::force::simd::Simd;
+use crate::state::particles::RECORD;
 use std::ops::Range;
 
 /// Numbers of an output line: force and the torques on both bodies, four places each, and four empty ones.
@@ -63,7 +64,16 @@ impl<C: ContactLaw> LawPass<C> {
         let start = blocks.start * BLOCK;
         section.hints.resize(section.blocks(), [CacheLine([0.0; BLOCK]); 3]);
         let mut touches = TouchBlock::EMPTY;
+        let far = size_of_val(bodies.records) > NEAREST_CACHES;
         for block in blocks {
+            let ahead = (block + RECORDS_AHEAD) * BLOCK..(block + RECORDS_AHEAD + 1) * BLOCK;
+            if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {
+                for (first, second) in first.iter().zip(second) {
+                    let body = (*first).max(*second) as usize / RECORD;
+                    prefetch(bodies.records, body, 1);
+                    prefetch(bodies.shapes, body, 1);
+                }
+            }
             self.take(&mut touches, input, bodies, section, block);
             section.hints[block] = touches.normals();
             let memory = &mut section.memory[block * section.columns..(block + 1) * section.columns];
@@ -173,11 +183,8 @@ impl<C: ContactLaw> LawPass<C> {
             }
             for place in block * BLOCK..((block + 1) * BLOCK).min(section.count) {
                 observed.line = line + place - start;
-                let touch = if walls {
-                    wall_touch(input, bodies, section, place)
-                } else {
-                    touches.load::<f64>(place % BLOCK)
-                };
+                let touch =
+                    if walls { wall_touch(input, bodies, section, place) } else { touches.load::<f64>(place % BLOCK) };
                 self.observe_ellipsoid(&touch, section, place, observed);
             }
         }
