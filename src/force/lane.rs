@@ -124,6 +124,13 @@ pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
     }
 }
 
+/// Whether these values have outgrown the nearest caches, so that asking ahead pays.
+#[inline(always)]
+#[must_use]
+pub fn is_far<T>(values: &[T]) -> bool {
+    size_of_val(values) > 1 << 18
+}
+
 /// The record that begins at this number of the slice.
 #[inline(always)]
 fn record_at(records: &[Record], offset: u32) -> &Record {

@@ -3,7 +3,7 @@
 
 use super::composition::{self, MAX_MEMORY};
 use super::geometry::{self, CellMotion, PairTouch};
-use super::lane::{Lane, prefetch};
+use super::lane::{Lane, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use super::lane::{avx2::F64x4, avx512::F64x8};
 use super::law::{Column, ContactLaw, LawVisitor, Touch};
@@ -30,9 +30,6 @@ const RECORDS_AHEAD: usize = 16;
 
 /// How many blocks ahead the list and the memory are asked for: the list before the records that it names.
 const LIST_AHEAD: usize = 2 * RECORDS_AHEAD;
-
-/// Bytes of records beyond which a system has outgrown the nearest caches.
-const NEAREST_CACHES: usize = 1 << 18;
 
 /// What all passes of a step share.
 #[derive(Debug, Clone, Copy)]
@@ -209,7 +206,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         let Job { input, bodies, section, blocks, mut lines, touches } = job;
         let records = bodies.records;
         let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
-        let far = size_of_val(records) > NEAREST_CACHES;
+        let far = is_far(records);
         let mut excess = None;
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);

@@ -2,7 +2,7 @@
 
 use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
-use crate::force::lane::prefetch;
+use crate::force::lane::{is_far, prefetch};
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
@@ -217,12 +217,14 @@ impl Phase<'_> {
         let (mut result, mut fault) = (StepResult::default(), None);
         let Ring { lines: ring, touches, loads } = &mut rings[0];
         let ring: &mut [f64] = bytemuck::cast_slice_mut(ring);
-        let mask = strip.ring - 1;
+        let (mask, far) = (strip.ring - 1, is_far(slice.record));
         let pairs = strip.near.len() / strip.chunks().max(1);
         for chunk in 0..strip.chunks() {
             let particles = strip.chunk(chunk);
-            view.ask_for_ends(&particles);
-            view.ask_for_lines(strip.kept_reads_of(chunk));
+            if far {
+                view.ask_for_ends(&particles);
+                view.ask_for_lines(strip.kept_reads_of(chunk));
+            }
             let from = strip.near.start + chunk * pairs;
             for run in &view.runs[from..from + pairs] {
                 let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };

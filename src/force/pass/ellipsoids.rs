@@ -1,11 +1,11 @@
 //! The loop around the laws where there are ellipsoids: geometry a block at a time, then the law, then lines
 //! with both torques.
 
-use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, NEAREST_CACHES, PassInput, RECORDS_AHEAD, first_excess};
+use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::composition::MAX_MEMORY;
 use crate::force::ellipsoid::touch::{self, EllipsoidTouch, Surroundings, TouchBlock};
-use crate::force::lane::{Lane, add, cross, dot, prefetch, scale, sub};
+use crate::force::lane::{Lane, add, cross, dot, is_far, prefetch, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{Column, ContactLaw};
@@ -64,7 +64,7 @@ impl<C: ContactLaw> LawPass<C> {
         let start = blocks.start * BLOCK;
         section.hints.resize(section.blocks(), [CacheLine([0.0; BLOCK]); 3]);
         let mut touches = TouchBlock::EMPTY;
-        let far = size_of_val(bodies.records) > NEAREST_CACHES;
+        let far = is_far(bodies.records);
         for block in blocks {
             let ahead = (block + RECORDS_AHEAD) * BLOCK..(block + RECORDS_AHEAD + 1) * BLOCK;
             if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {

@@ -1,9 +1,9 @@
 //! The geometric stages of the contact pass between spheres: the bodies relative to each other, then the touch.
 
-use super::{Excess, NEAREST_CACHES, PassInput, RECORDS_AHEAD, first_excess};
+use super::{Excess, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, Section};
 use crate::force::geometry;
-use crate::force::lane::{Lane, prefetch};
+use crate::force::lane::{Lane, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
@@ -70,7 +70,7 @@ fn geometry_of<L: Lane>(
     let limit = L::splat(input.max_overlap_fraction);
     let lanes = || (0..BLOCK).step_by(L::WIDTH);
     let numbers: &[f64] = bytemuck::cast_slice(records);
-    let far = size_of_val(records) > NEAREST_CACHES;
+    let far = is_far(records);
     for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
         for lane in lanes() {
             let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
