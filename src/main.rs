@@ -4,6 +4,11 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const TUNABLES: &str = "GLIBC_TUNABLES";
 
+/// Large pages; and the size from which memory goes back to the system when it is freed: a fixed one, as the C library
+/// otherwise raises it to that of the largest array freed, and keeps what set-up no longer needs.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const SETTINGS: &str = "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=4194304";
+
 fn main() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     with_large_pages();
@@ -22,10 +27,6 @@ fn with_large_pages() {
         let mut arguments = std::env::args_os();
         let name = arguments.next().unwrap_or_else(|| "dem-mpi".into());
         // Comes back only if it failed; then small pages do.
-        let _ = std::process::Command::new(program)
-            .arg0(name)
-            .args(arguments)
-            .env(TUNABLES, "glibc.malloc.hugetlb=1")
-            .exec();
+        let _ = std::process::Command::new(program).arg0(name).args(arguments).env(TUNABLES, SETTINGS).exec();
     }
 }

@@ -13,7 +13,7 @@ use crate::force::lane::{Lane, SHAPE, prefetch};
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
-use crate::state::particles::{Particles, RECORD, Record, padded, trimmed};
+use crate::state::particles::{Particles, RECORD, Record, trimmed};
 use crate::state::shape::Shape;
 use std::ops::Range;
 
@@ -96,7 +96,7 @@ pub struct Slice<'a> {
     /// Their shapes; empty when every particle of all ranks is a sphere.
     pub shape: &'a mut [Shape],
     ledger: &'a mut [[f64; LEDGER.len()]],
-    reference: &'a mut [[f64; 4]],
+    reference: &'a mut [[f64; 3]],
     crossed: &'a mut [[i8; 4]],
 }
 
@@ -151,8 +151,8 @@ impl<'a> Slice<'a> {
 /// Positions at the last list rebuild and the images crossed since the last Verlet list.
 #[derive(Debug, Clone, Default)]
 pub struct Reference {
-    /// Positions then, seen from the image in which the particle is now \[m\]; the fourth number is 0.
-    pub position: Vec<[f64; 4]>,
+    /// Positions then, seen from the image in which the particle is now \[m\].
+    pub position: Vec<[f64; 3]>,
     /// Images crossed since the last Verlet list, of owned particles and ghosts; the fourth is 0.
     pub crossed: Vec<[i8; 4]>,
 }
@@ -167,7 +167,7 @@ impl Reference {
     /// Take the present positions of the owned particles.
     pub fn take(&mut self, particles: &Particles) {
         self.position.clear();
-        self.position.extend(particles.record[..particles.owned].iter().map(|record| padded(record.position)));
+        self.position.extend(particles.record[..particles.owned].iter().map(|record| record.position));
     }
 
     /// A particle crossed periodic faces.
@@ -280,7 +280,7 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
         velocity.store(&mut slice.velocity[index]);
         let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
         L::select(vector, velocity + half * acceleration, L::load(&record[4..8])).store(&mut record[4..8]);
-        let moved = position - stretch * L::load(&slice.reference[index]);
+        let moved = position - stretch * three(slice.reference[index], 0.0);
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
         let squared = squares[0] + squares[1] + squares[2];
