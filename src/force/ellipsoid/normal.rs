@@ -81,8 +81,9 @@ impl<L: Lane> Ellipsoids<L> {
     }
 
     /// Minimise o(n) over the unit sphere from `start`, by Newton's method on the sphere with the Hessian
-    /// `W_i + W_j − o I`; in each of its two principal directions the step is `−g/(|λ| + μ)`, so that it goes down also
-    /// where the curvature λ is negative. μ grows where the overlap did not fall and shrinks where it did.
+    /// `W_i + W_j − o I`. Where it is not clearly positive the step is `−g/(|λ| + μ)` in each of its two principal
+    /// directions, so that it goes down also where the curvature λ is negative. μ grows where the overlap did not fall and
+    /// shrinks where it did. A last step that is short enough is taken by first derivatives, without another evaluation.
     ///
     /// A lane stops when it has converged or when its overlap is at most `bound` (then n separates the bodies by
     /// as much), and moves no more.
