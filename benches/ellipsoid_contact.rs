@@ -68,9 +68,9 @@ fn scene(aspect: f64) -> Scene {
 
 impl Scene {
     fn touches(&self, simd: Simd, motion: &CellMotion, block: usize) -> TouchBlock {
-        let surroundings = Surroundings { motion, range: 0.0 };
+        let surroundings = Surroundings { motion, range: 0.0, simd };
         let mut touches = TouchBlock::EMPTY;
-        touches.take(simd, &surroundings, &self.records, &self.shapes, &self.section, block, 0);
+        touches.take(&surroundings, &self.records, &self.shapes, &self.section, block, 0);
         touches
     }
 

@@ -31,6 +31,8 @@ pub struct Surroundings<'a> {
     pub motion: &'a CellMotion,
     /// Gap over the smallest semi-axis of a pair beyond which nothing more is asked of it.
     pub range: f64,
+    /// Instructions to use.
+    pub simd: Simd,
 }
 
 /// Numbers of an [`EllipsoidTouch`].
@@ -49,7 +51,6 @@ impl TouchBlock {
     /// is.
     pub fn take(
         &mut self,
-        simd: Simd,
         surroundings: &Surroundings,
         records: &[Record],
         shapes: &[Shape],
@@ -58,7 +59,7 @@ impl TouchBlock {
         normals: usize,
     ) {
         let from = Source { surroundings, records, shapes, section, block, normals };
-        match simd {
+        match surroundings.simd {
             // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
             #[cfg(target_arch = "x86_64")]
             Simd::Avx512 => unsafe { self.fill_avx512(&from) },

@@ -52,8 +52,8 @@ impl<C: ContactLaw> LawPass<C> {
 
     fn take(&self, touches: &mut TouchBlock, input: &PassInput, bodies: BodyData, section: &Section, block: usize) {
         let range = if C::LASTS { self.law.range() } else { 0.0 };
-        let surroundings = Surroundings { motion: input.motion, range };
-        touches.take(input.simd, &surroundings, bodies.records, bodies.shapes, section, block, C::MEMORY);
+        let surroundings = Surroundings { motion: input.motion, range, simd: input.simd };
+        touches.take(&surroundings, bodies.records, bodies.shapes, section, block, C::MEMORY);
     }
 
     #[inline(always)]
