@@ -226,6 +226,11 @@ fn a_stored_normal_finds_the_same_place_in_a_few_evaluations() {
         let cold = pair.common_normal([0.0; 3], [0.0; 3], 0.0);
         if warm.found.overlap > 0.0 {
             assert!((warm.found.overlap - cold.found.overlap).abs() < 1e-14 * size);
+            let between = sub(sub(warm.found.first_point, warm.found.second_point), pair.branch);
+            for k in 0..3 {
+                assert!((between[k] - warm.found.overlap * warm.found.normal[k]).abs() < 1e-12 * size, "{between:?}");
+                assert!((warm.found.normal[k] - cold.found.normal[k]).abs() < 1e-10);
+            }
             most = most.max(warm.evaluations);
         }
     }
