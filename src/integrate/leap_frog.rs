@@ -265,7 +265,7 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
             let angular = torque * L::splat(slice.spin[index][3]);
             let spin = L::load(&slice.spin[index]) + kick * angular;
             spin.store(&mut slice.spin[index]);
-            L::select(vector, spin + half * angular, L::load(&record[8..])).store(&mut record[8..]);
+            L::select(vector, spin + half * angular, L::splat(record[11])).store(&mut record[8..]);
             if motion.orientation {
                 slice.orientation[index] = turned(slice.orientation[index], trimmed(slice.spin[index]), new);
             }
@@ -279,7 +279,7 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
         }
         velocity.store(&mut slice.velocity[index]);
         let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
-        L::select(vector, velocity + half * acceleration, L::load(&record[4..8])).store(&mut record[4..8]);
+        L::select(vector, velocity + half * acceleration, L::splat(record[7])).store(&mut record[4..8]);
         let moved = position - stretch * three(slice.reference[index], 0.0);
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
