@@ -9,6 +9,7 @@
 
 use super::section::{BLOCK, PARTNERS, Partners, Section};
 use super::shift;
+use crate::force::lane::prefetch;
 use crate::state::ContactKey;
 use crate::state::particles::Particles;
 use rayon::prelude::*;
@@ -43,8 +44,8 @@ pub struct Strip {
     pub first_line: usize,
     /// Lines that the ring must hold, a power of two.
     pub ring: usize,
-    /// For each chunk how many of its particles have near contacts only.
-    pub near_only: Vec<u8>,
+    /// See [`Strip::slots`]; more than the number of each end of the strip's particles.
+    slots: usize,
     /// Kept lines that the particles' sums read, chunk by chunk.
     pub kept_reads: Vec<u32>,
     /// For each chunk the end of its part of `kept_reads`.
@@ -56,6 +57,13 @@ impl Strip {
     #[must_use]
     pub fn chunks(&self) -> usize {
         self.particles.len().div_ceil(CHUNK)
+    }
+
+    /// Slots of the buffer: the ring's, then one per kept line that the sums of a chunk read, as many as the chunk
+    /// with the most.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.slots
     }
 
     /// Kept lines that the sums of a chunk read.
@@ -73,27 +81,80 @@ impl Strip {
     }
 }
 
-/// One end of a contact as its particle sees it: the number of the output line and the side.
+/// One end of a contact as its particle sees it: a number and the side. The number is the slot of the strip's buffer
+/// where the sums find the output line; of a ghost, which nobody sums here, the line's own. Up to 2^29 lines per rank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct End(u32);
 
 impl End {
     /// `second`: the particle is the contact's second.
-    #[must_use]
-    pub fn new(line: usize, second: bool) -> Self {
-        Self((line as u32) << 1 | u32::from(second))
+    fn new(number: usize, second: bool) -> Self {
+        Self((number as u32) << 3 | u32::from(second) << 2)
     }
-    /// Number of the output line.
+    /// Slot or line.
     #[inline(always)]
     #[must_use]
-    pub fn line(self) -> usize {
-        (self.0 >> 1) as usize
+    pub fn number(self) -> usize {
+        (self.0 >> 3) as usize
+    }
+    /// 0 at the contact's first, 4 at its second: where the numbers of the second follow four places after those
+    /// of the first.
+    #[inline(always)]
+    #[must_use]
+    pub fn side(self) -> usize {
+        (self.0 & 4) as usize
+    }
+    /// Where the numbers of the end's side begin among lines of `STRIDE` numbers: its line and [`Self::side`].
+    #[inline(always)]
+    #[must_use]
+    pub fn start<const STRIDE: usize>(self) -> usize {
+        if STRIDE == 8 { self.0 as usize } else { self.number() * STRIDE + self.side() }
     }
     /// The particle is the contact's second.
     #[inline(always)]
     #[must_use]
     pub fn is_second(self) -> bool {
-        self.0 & 1 == 1
+        self.side() != 0
+    }
+}
+
+/// The ends of the particles of one chunk.
+#[derive(Debug, Clone, Copy)]
+pub struct ChunkEnds<'a> {
+    /// Of the chunk's particles and one more, rising, none beyond `ends`.
+    offsets: &'a [u32],
+    ends: &'a [End],
+    /// Places within the chunk, each less than the number of its particles.
+    summing: &'a [u8],
+    slots: usize,
+}
+
+impl<'a> ChunkEnds<'a> {
+    /// The ends of the particle at this place of the chunk.
+    #[inline(always)]
+    #[must_use]
+    pub fn of(&self, place: usize) -> &'a [End] {
+        &self.ends[self.offsets[place] as usize..self.offsets[place + 1] as usize]
+    }
+
+    /// The chunk's places in the order of summing, each with its ends.
+    #[inline(always)]
+    pub fn in_order(self) -> impl Iterator<Item = (usize, &'a [End])> {
+        self.summing.iter().map(move |place| {
+            let place = usize::from(*place);
+            // SAFETY: [`ContactList::index`] makes what the fields promise, and nobody else can change it.
+            let ends = unsafe {
+                let (from, to) = (self.offsets.get_unchecked(place), self.offsets.get_unchecked(place + 1));
+                self.ends.get_unchecked(*from as usize..*to as usize)
+            };
+            (place, ends)
+        })
+    }
+
+    /// More than the number of any of the ends, see [`Strip::slots`].
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.slots
     }
 }
 
@@ -116,13 +177,47 @@ pub struct ContactList {
     /// Number of output lines, padding included.
     pub lines: usize,
     /// `ends[offsets[p]..offsets[p+1]]` are those of local particle `p`.
-    pub offsets: Vec<u32>,
+    offsets: Vec<u32>,
     /// Ends of all particles.
-    pub ends: Vec<End>,
-    /// For each owned particle a place within its chunk: the order in which the chunk's particles are summed up. Those
-    /// with near contacts only come first; each kind goes by the number of contacts, so that the processor foresees how
-    /// often the loop over them runs.
-    pub summing: Vec<u8>,
+    ends: Vec<End>,
+    /// For each owned particle a place within its chunk: the order in which the chunk's particles are summed up, by the
+    /// number of contacts, so that the processor foresees how often the loop over them runs.
+    summing: Vec<u8>,
+}
+
+/// What a step reads of a contact list.
+#[derive(Debug, Clone, Copy)]
+pub struct Reading<'a> {
+    /// As [`ContactList::strips`].
+    pub strips: &'a [Strip],
+    /// As [`ContactList::runs`].
+    pub runs: &'a [Run],
+    offsets: &'a [u32],
+    ends: &'a [End],
+    summing: &'a [u8],
+}
+
+impl<'a> Reading<'a> {
+    /// The ends of the particles of a strip's chunk.
+    #[must_use]
+    pub fn ends_of(&self, strip: usize, chunk: usize) -> ChunkEnds<'a> {
+        let strip = &self.strips[strip];
+        let particles = strip.chunk(chunk);
+        ChunkEnds {
+            offsets: &self.offsets[particles.start..=particles.end],
+            ends: self.ends,
+            summing: &self.summing[particles],
+            slots: strip.slots,
+        }
+    }
+
+    /// Ask for what [`Self::ends_of`] gives, and for the offsets of the chunk after.
+    pub fn ask_for_ends(&self, particles: &Range<usize>) {
+        let [first, last] = [particles.start, particles.end].map(|particle| self.offsets[particle] as usize);
+        prefetch(self.ends, first, last - first);
+        prefetch(self.summing, particles.start, CHUNK);
+        prefetch(self.offsets, particles.end, 2 * CHUNK);
+    }
 }
 
 impl ContactList {
@@ -144,11 +239,17 @@ impl ContactList {
             kept: 0..0,
             first_line: 0,
             ring: BLOCK,
-            near_only: Vec::new(),
+            slots: BLOCK,
             kept_reads: Vec::new(),
             kept_read_ends: Vec::new(),
         };
         self.strips = strips.into_iter().map(strip).collect();
+    }
+
+    /// What a step reads, and the sections, whose memory it changes.
+    pub fn parts(&mut self) -> (Reading<'_>, &mut [Section]) {
+        let Self { strips, sections, runs, offsets, ends, summing, .. } = self;
+        (Reading { strips, runs, offsets, ends, summing }, sections)
     }
 
     /// Sections per strip.
@@ -157,11 +258,31 @@ impl ContactList {
         PARTNERS.len() * self.pairs
     }
 
-    /// The ends of a local particle.
-    #[inline(always)]
-    #[must_use]
-    pub fn ends_of(&self, particle: usize) -> &[End] {
-        &self.ends[self.offsets[particle] as usize..self.offsets[particle + 1] as usize]
+    /// The output lines of a local particle's contacts, in the order of summation, and whether it is their second.
+    pub fn lines_of(&self, particle: usize) -> impl Iterator<Item = (usize, bool)> {
+        let ends = &self.ends[self.offsets[particle] as usize..self.offsets[particle + 1] as usize];
+        let strip = self.strips.partition_point(|strip| strip.particles.end <= particle);
+        let strip = self.strips.get(strip).map(|strip| (strip, (particle - strip.particles.start) / CHUNK));
+        ends.iter().map(move |end| {
+            let number = end.number();
+            let line = match strip {
+                None => number,
+                Some((strip, chunk)) if number >= strip.ring => {
+                    strip.kept_reads_of(chunk)[number - strip.ring] as usize
+                }
+                Some((strip, chunk)) => {
+                    let last = self.reached(strip, chunk) - 1;
+                    last - ((last - number) & (strip.ring - 1))
+                }
+            };
+            (line, end.is_second())
+        })
+    }
+
+    /// Number of the first line after those of a strip's chunk.
+    fn reached(&self, strip: &Strip, chunk: usize) -> usize {
+        let next = strip.near.start + (chunk + 1) * self.pairs;
+        self.runs.get(next).map_or(self.lines, |run| run.line as usize)
     }
 
     /// Contacts without padding.
@@ -180,16 +301,15 @@ impl ContactList {
     /// A particle was wrapped by `wraps` images (+1: it left through the high face): adjust the shifts
     /// of its contacts so that every pair vector stays what it was.
     pub fn apply_wrap(&mut self, particle: usize, wraps: [i32; 3]) {
-        let range = self.offsets[particle] as usize..self.offsets[particle + 1] as usize;
-        for position in range {
-            let end = self.ends[position];
-            let (section, place) = self.locate(end.line());
+        let lines: Vec<_> = self.lines_of(particle).collect();
+        for (line, is_second) in lines {
+            let (section, place) = self.locate(line);
             let section = &mut self.sections[section];
             if section.partners == Partners::Wall {
                 continue;
             }
             let old = shift::decode(section.shift[place]);
-            let sign = if end.is_second() { 1 } else { -1 };
+            let sign = if is_second { 1 } else { -1 };
             section.shift[place] = shift::encode([0, 1, 2].map(|k| old[k] + sign * wraps[k]));
         }
     }
@@ -255,26 +375,31 @@ impl ContactList {
         self.lines = line;
     }
 
+    /// From lines to slots, and the order of the sums.
     fn order_sums(&mut self) {
         let Self { strips, offsets, ends, kept, summing, .. } = self;
         summing.resize(strips.last().map_or(0, |strip| strip.particles.end), 0);
         for strip in strips {
-            let particles = &offsets[strip.particles.start..=strip.particles.end];
-            let chunks = summing[strip.particles.clone()].chunks_mut(CHUNK).enumerate();
-            let chunks = chunks.map(|(chunk, summing)| {
-                let start = chunk * CHUNK;
-                order_chunk(&particles[start..=start + summing.len()], ends, *kept, summing)
-            });
-            strip.near_only.clear();
-            strip.near_only.extend(chunks);
             strip.kept_reads.clear();
             strip.kept_read_ends.clear();
+            strip.slots = strip.ring;
             for chunk in 0..strip.chunks() {
                 let particles = strip.chunk(chunk);
-                let ends = &ends[offsets[particles.start] as usize..offsets[particles.end] as usize];
-                strip
-                    .kept_reads
-                    .extend(ends.iter().map(|end| end.line()).filter(|line| line < kept).map(|line| line as u32));
+                let offsets = &offsets[particles.start..=particles.end];
+                order_chunk(offsets, &mut summing[particles]);
+                let mut slots = strip.ring;
+                for end in &mut ends[offsets[0] as usize..offsets[offsets.len() - 1] as usize] {
+                    let line = end.number();
+                    let slot = if line < *kept {
+                        strip.kept_reads.push(line as u32);
+                        slots += 1;
+                        slots - 1
+                    } else {
+                        line & (strip.ring - 1)
+                    };
+                    *end = End::new(slot, end.is_second());
+                }
+                strip.slots = strip.slots.max(slots);
                 strip.kept_read_ends.push(strip.kept_reads.len() as u32);
             }
         }
@@ -326,23 +451,19 @@ impl ContactList {
     }
 }
 
-/// See [`ContactList::summing`]; gives how many particles have near contacts only.
-fn order_chunk(offsets: &[u32], ends: &[End], kept: usize, summing: &mut [u8]) -> u8 {
-    const KEPT: u16 = 1 << 15;
+/// See [`ContactList::summing`].
+fn order_chunk(offsets: &[u32], summing: &mut [u8]) {
     const PLACES: u16 = CHUNK as u16 - 1;
     let mut keys = [0; CHUNK];
     for (place, bounds) in offsets.windows(2).enumerate() {
-        let ends = &ends[bounds[0] as usize..bounds[1] as usize];
-        let has_kept = ends.iter().any(|end| end.line() < kept);
-        let count = ends.len().min(usize::from(KEPT / CHUNK as u16) - 1);
-        keys[place] = if has_kept { KEPT } else { 0 } | (count * CHUNK + place) as u16;
+        let count = ((bounds[1] - bounds[0]) as usize).min(usize::from(u16::MAX) / CHUNK);
+        keys[place] = (count * CHUNK + place) as u16;
     }
     let keys = &mut keys[..summing.len()];
     keys.sort_unstable();
     for (slot, key) in summing.iter_mut().zip(&*keys) {
         *slot = (key & PLACES) as u8;
     }
-    keys.partition_point(|key| *key < KEPT) as u8
 }
 
 /// Sort the ends of each particle by their keys, on all threads.

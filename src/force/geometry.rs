@@ -106,27 +106,24 @@ impl<L: Lane> PairTouch<L> {
 #[inline(always)]
 #[must_use]
 pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
-    let zero = L::splat(0.0);
-    let (mut image_shift, mut imposed_velocity) = ([zero; 3], [zero; 3]);
-    // Away from periodic faces there is nothing to look up.
-    if !shift::all_here(codes) {
-        image_shift = image(&motion.shift, codes);
-        if motion.faces_move {
-            imposed_velocity = image(&motion.shift_velocity, codes);
-        }
-    }
     let [[x, y, z, radius_difference], [vx, vy, vz, inverse_masses], [wx, wy, wz, radius_sum]] =
         L::relative(records, pairs);
-    let branch = add([x, y, z], image_shift);
+    let mut branch = [x, y, z];
+    // Away from periodic faces there is nothing to look up and nothing to add, as no component is −0.
+    if !shift::all_here(&codes[..L::WIDTH]) {
+        branch = add(branch, image(&motion.shift, codes));
+    }
     let [gx, gy, gz] = motion.gradient;
-    let affine = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
-    imposed_velocity = add(imposed_velocity, affine);
+    let mut imposed_velocity = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
+    if motion.faces_move {
+        imposed_velocity = add(imposed_velocity, image(&motion.shift_velocity, codes));
+    }
     Relative {
         branch,
         velocity: add([vx, vy, vz], imposed_velocity),
         imposed_velocity,
         spin_sum: [wx, wy, wz],
-        relative_spin: [zero; 3],
+        relative_spin: [L::splat(0.0); 3],
         radius_difference,
         radius_sum,
         inverse_masses,

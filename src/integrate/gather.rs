@@ -1,64 +1,33 @@
 //! Sum of the contact forces and torques on a particle, in order of (partner id, image shift), so
 //! that every rank and thread count gives the same bits.
 
-use crate::contact::list::End;
+use crate::contact::list::{CHUNK, ChunkEnds, End};
 use crate::force::lane::Lane;
 use crate::force::observe::CONTACT_LEDGER;
 use crate::force::pass::LEDGER_STRIDE;
 
-/// Output lines of the contact passes as the particles of one strip see them.
-#[derive(Debug, Clone, Copy)]
+/// Output lines of the contact passes as the particles of one chunk see them.
+#[derive(Debug)]
 pub struct Lines<'a> {
     /// Numbers per line that hold forces, torques and moments: 4, 8, 12, or 16 between ellipsoids.
     pub width: usize,
     /// Numbers per line, with the ledger's.
     pub stride: usize,
+    /// The strip's buffer: its ring, then room for the kept lines that the sums read.
+    pub buffer: &'a mut [f64],
+    /// Slots of the ring.
+    pub ring: usize,
     /// Lines kept for the step, from number 0 on.
     pub kept: &'a [f64],
-    /// The strip's ring: line `n` at place `n mod capacity`.
-    pub ring: &'a [f64],
-    /// Capacity of the ring less one.
-    pub mask: usize,
-}
-
-/// The ends of the particles of one chunk.
-#[derive(Debug, Clone, Copy)]
-pub struct ChunkEnds<'a> {
-    /// `ends[offsets[p]..offsets[p + 1]]` are those of the chunk's particle `p`.
-    pub offsets: &'a [u32],
-    /// Ends of the contact list.
-    pub ends: &'a [End],
-    /// The chunk's part of the list's order of summing.
-    pub summing: &'a [u8],
-    /// How many particles, the first ones in this order, have lines in the ring only.
-    pub near_only: usize,
-}
-
-impl ChunkEnds<'_> {
-    /// The ends of one particle.
-    #[inline(always)]
-    #[must_use]
-    pub fn of(&self, place: u8) -> &[End] {
-        let place = usize::from(place);
-        &self.ends[self.offsets[place] as usize..self.offsets[place + 1] as usize]
-    }
+    /// Those of them that the sums read, in the order of their slots.
+    pub reads: &'a [u32],
 }
 
 impl Lines<'_> {
-    /// Numbers `offset .. offset + N` of a line.
-    #[inline(always)]
-    fn part<const N: usize>(&self, number: usize, offset: usize) -> &[f64; N] {
-        let kept = number * self.stride < self.kept.len();
-        let place = if kept { number } else { number & self.mask };
-        let values = if kept { self.kept } else { self.ring };
-        let start = place * self.stride + offset;
-        values[start..start + N].try_into().expect("a slice of N numbers")
-    }
-
     /// Sums over the contacts of consecutive particles, in lanes four wide: force \[N\], torque about the centre
     /// \[N m\], the fourth number of each without meaning.
     #[inline(always)]
-    pub fn sum_all<L: Lane>(&self, chunk: &ChunkEnds, loads: &mut [[f64; 8]]) {
+    pub fn sum_all<L: Lane>(&mut self, chunk: &ChunkEnds, loads: &mut [[f64; 8]; CHUNK]) {
         match (self.width, self.stride) {
             (4, 4) => self.sums::<L, 4, 4>(chunk, loads),
             (8, 8) => self.sums::<L, 8, 8>(chunk, loads),
@@ -72,33 +41,33 @@ impl Lines<'_> {
     }
 
     #[inline(always)]
-    fn sums<L: Lane, const WIDTH: usize, const STRIDE: usize>(&self, chunk: &ChunkEnds, loads: &mut [[f64; 8]]) {
-        let [ring, kept] = [self.ring, self.kept].map(|values| values.as_chunks::<STRIDE>().0);
-        // From memory, not known to the compiler: its way of making signs of bits is longer.
-        let signs = std::hint::black_box([1.0, -1.0]);
-        let (near_only, others) = chunk.summing.split_at(chunk.near_only);
-        for place in near_only {
-            let line = |line: usize| &ring[line & self.mask];
-            loads[usize::from(*place)] = sum::<L, WIDTH, STRIDE>(chunk.of(*place), &signs, line);
+    fn sums<L: Lane, const WIDTH: usize, const STRIDE: usize>(
+        &mut self,
+        chunk: &ChunkEnds,
+        loads: &mut [[f64; 8]; CHUNK],
+    ) {
+        let lines = self.buffer.as_chunks_mut::<STRIDE>().0;
+        let kept = self.kept.as_chunks::<STRIDE>().0;
+        for (slot, line) in lines[self.ring..].iter_mut().zip(self.reads) {
+            *slot = kept[*line as usize];
         }
-        // By table, not by branch: which of the two comes next is anybody's guess.
-        let (lines, masks) = ([ring, kept], [self.mask, usize::MAX]);
-        for place in others {
-            loads[usize::from(*place)] = sum::<L, WIDTH, STRIDE>(chunk.of(*place), &signs, |line| {
-                let table = usize::from(line < kept.len());
-                &lines[table][line & masks[table]]
-            });
+        let numbers = lines[..chunk.slots()].as_flattened();
+        // From memory, not known to the compiler: its way of making signs of bits is longer.
+        let signs = std::hint::black_box([1.0, 0.0, 0.0, 0.0, -1.0]);
+        for (place, ends) in chunk.in_order() {
+            // SAFETY: every end names a slot of the chunk's, and `numbers` holds them all.
+            loads[place % CHUNK] = unsafe { sum::<L, WIDTH, STRIDE>(ends, &signs, numbers) };
         }
     }
 
-    /// Add what the contacts of which this particle has the lower id put into its ledger.
+    /// Add what the contacts of which this particle has the lower id put into its ledger; after the sums.
     #[inline(always)]
     pub fn add_ledger(&self, ends: &[End], ledger: &mut [f64]) {
         // Contact entries: cell, driven, damping, viscous, friction, plastic; the particle's ledger has
         // the work of body forces between the first two.
         const TO: [usize; CONTACT_LEDGER] = [0, 2, 3, 4, 5, 6];
         for end in ends.iter().filter(|end| !end.is_second()) {
-            let entries = self.part::<CONTACT_LEDGER>(end.line(), self.width);
+            let entries = &self.buffer[end.number() * self.stride + self.width..][..CONTACT_LEDGER];
             for (value, to) in entries.iter().zip(TO) {
                 ledger[to] += value;
             }
@@ -107,27 +76,33 @@ impl Lines<'_> {
 }
 
 /// Sum over the contacts of one particle.
+///
+/// # Safety
+/// `numbers` holds `STRIDE` numbers for every slot up to those that the ends name.
 #[inline(always)]
-fn sum<'a, L: Lane, const WIDTH: usize, const STRIDE: usize>(
+unsafe fn sum<L: Lane, const WIDTH: usize, const STRIDE: usize>(
     ends: &[End],
-    signs: &[f64; 2],
-    line_of: impl Fn(usize) -> &'a [f64; STRIDE],
+    signs: &[f64; 5],
+    numbers: &[f64],
 ) -> [f64; 8] {
     let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
     for end in ends {
-        let line = line_of(end.line());
-        let second = usize::from(end.is_second());
-        let sign = L::splat(signs[second]);
-        force = force + sign * L::load(&line[..4]);
+        let (line, side) = (end.number() * STRIDE, end.start::<STRIDE>());
+        // SAFETY: as the function's; no part of a line is longer than `STRIDE`, and 8 where sides differ.
+        let four = |start: usize| unsafe { L::load(numbers.get_unchecked(start..start + 4)) };
+        let sign = L::splat(signs[end.side()]);
+        force = force + sign * four(line);
         if WIDTH == 16 {
-            torque = torque + L::load(&line[4 + 4 * second..][..4]);
+            torque = torque + four(side + 4);
             continue;
         }
         if WIDTH >= 8 {
-            torque = torque + L::splat(line[3 + 4 * second]) * L::load(&line[4..8]);
+            // SAFETY: as above.
+            let arm = unsafe { *numbers.get_unchecked(side + 3) };
+            torque = torque + L::splat(arm) * four(line + 4);
         }
         if WIDTH >= 12 {
-            torque = torque + sign * L::load(&line[8..12]);
+            torque = torque + sign * four(line + 8);
         }
     }
     let mut load = [0.0; 8];

@@ -3,9 +3,9 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
-use super::gather::{ChunkEnds, Lines};
+use super::gather::Lines;
 use super::rotation::{Body, Rotation, Spins};
-use crate::contact::list::CHUNK;
+use crate::contact::list::{CHUNK, ChunkEnds};
 use crate::contact::section::BLOCK;
 use crate::force::lane::portable::Portable;
 use crate::force::lane::{Lane, SHAPE, prefetch};
@@ -62,14 +62,15 @@ pub struct StepResult {
 }
 
 impl StepResult {
-    /// A squared displacement above all before, or one that is not a number.
+    /// A squared displacement above all before, or one that is not a number; gives the largest now.
     #[cold]
-    fn take_displacement(&mut self, squared: f64, particle: u32) {
+    fn take_displacement(&mut self, squared: f64, particle: u32) -> f64 {
         if squared.is_nan() {
             self.lost = Some(particle);
         } else {
             self.max_displacement_squared = squared;
         }
+        self.max_displacement_squared
     }
 
     /// Join with what other particles brought.
@@ -227,15 +228,34 @@ fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
 /// Ellipsoids turn before, in the lanes `W` side by side.
 #[inline(always)]
 fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    let Batch { range, chunk, lines, loads, motion } = batch;
+    let Batch { range, chunk, mut lines, loads, motion } = batch;
     const { assert!(L::WIDTH == 4) };
     lines.sum_all::<L>(&chunk, loads);
     if motion.ledger {
         for (place, (index, load)) in range.clone().zip(&*loads).enumerate() {
-            lines.add_ledger(chunk.of(place as u8), &mut slice.ledger[index]);
+            lines.add_ledger(chunk.of(place), &mut slice.ledger[index]);
             add_external_work(&mut slice.ledger[index], &slice.record[index], load, motion);
         }
     }
+    if !slice.shape.is_empty() {
+        turn_all::<W>(slice, range.clone(), loads, motion);
+    }
+    if motion.rotation && slice.shape.is_empty() {
+        move_all::<L, true>(slice, range, loads, motion, result);
+    } else {
+        move_all::<L, false>(slice, range, loads, motion, result);
+    }
+}
+
+/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation.
+#[inline(always)]
+fn move_all<L: Lane, const TURN: bool>(
+    slice: &mut Slice,
+    range: Range<usize>,
+    loads: &[[f64; 8]],
+    motion: &StepMotion,
+    result: &mut StepResult,
+) {
     let zero = L::splat(0.0);
     let three = |v: [f64; 3], fourth: f64| L::load(&[v[0], v[1], v[2], fourth]);
     let vector = three([1.0; 3], 0.0).greater(zero);
@@ -246,46 +266,60 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     let gravity = three(motion.gravity, 0.0);
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
-    if !slice.shape.is_empty() {
-        turn_all::<W>(slice, range.clone(), loads, motion);
-    }
-    for (index, load) in range.zip(loads) {
+    let bodies = slice.record[range.clone()].iter_mut().zip(&mut slice.velocity[range.clone()]);
+    let turning = slice.spin[range.clone()].iter_mut().zip(&mut slice.reference[range.clone()]);
+    let mut farthest = result.max_displacement_squared;
+    for ((((record, velocity), (spin, reference)), load), index) in bodies.zip(turning).zip(loads).zip(range) {
         // What a later chunk needs and no contact has touched.
-        prefetch(slice.velocity, index + AHEAD, 1);
-        prefetch(slice.spin, index + AHEAD, 1);
-        prefetch(slice.reference, index + AHEAD, 1);
+        prefetch(std::slice::from_ref(velocity), AHEAD, 1);
+        prefetch(std::slice::from_ref(spin), AHEAD, 1);
+        prefetch(std::slice::from_ref(reference), AHEAD, 1);
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
-        let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
-        let inverse_mass = L::splat(record[7]);
+        let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
+        let inverse_mass = L::splat(numbers[7]);
         let pull = L::select(inverse_mass.greater(zero), gravity, zero);
         let acceleration = force * inverse_mass + pull;
-        let mut velocity = L::load(&slice.velocity[index]) + kick * acceleration;
-        let mut position = scale * L::load(&record[..4]) + drift * velocity;
-        if motion.rotation && slice.shape.is_empty() {
-            let angular = torque * L::splat(slice.spin[index][3]);
-            let spin = L::load(&slice.spin[index]) + kick * angular;
-            spin.store(&mut slice.spin[index]);
-            L::select(vector, spin + half * angular, L::splat(record[11])).store(&mut record[8..]);
+        let mut half_velocity = L::load(velocity) + kick * acceleration;
+        let mut position = scale * L::load(&numbers[..4]) + drift * half_velocity;
+        // The fourth numbers come from splats: stores of some lanes only are slow.
+        if TURN {
+            let angular = torque * L::splat(spin[3]);
+            let half_spin = L::load(spin) + kick * angular;
+            half_spin.store(spin);
+            L::select(vector, half_spin + half * angular, L::splat(numbers[3])).store(&mut numbers[8..]);
             if motion.orientation {
-                slice.orientation[index] = turned(slice.orientation[index], trimmed(slice.spin[index]), new);
+                slice.orientation[index] = turned(slice.orientation[index], trimmed(*spin), new);
             }
         }
-        position.store(&mut record[..4]);
+        position.store(&mut numbers[..4]);
         if L::any(zero.greater(position) | position.at_least(sides)) {
-            velocity.store(&mut slice.velocity[index]);
-            wrap(slice, index, motion, result);
-            velocity = L::load(&slice.velocity[index]);
-            position = L::load(&bytemuck::cast_ref::<_, [f64; RECORD]>(&slice.record[index])[..4]);
+            half_velocity.store(velocity);
+            let particle = (slice.start + index) as u32;
+            let crossed = wrap(record, velocity, reference, motion);
+            if crossed.lost {
+                result.lost = Some(particle);
+            }
+            if crossed.wraps != [0; 3] {
+                for (image, wrap) in slice.image[index].iter_mut().zip(crossed.wraps) {
+                    *image += wrap;
+                }
+                cross(&mut slice.crossed[index], crossed.wraps);
+                result.wrapped.push((particle, crossed.wraps));
+            }
+            half_velocity = L::load(velocity);
+            position = L::load(&bytemuck::cast_ref::<_, [f64; RECORD]>(record)[..4]);
         }
-        velocity.store(&mut slice.velocity[index]);
-        let record: &mut [f64; RECORD] = bytemuck::cast_mut(&mut slice.record[index]);
-        L::select(vector, velocity + half * acceleration, L::splat(record[7])).store(&mut record[4..8]);
-        let moved = position - stretch * three(slice.reference[index], 0.0);
+        half_velocity.store(velocity);
+        let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
+        L::select(vector, half_velocity + half * acceleration, inverse_mass).store(&mut numbers[4..8]);
+        let moved = position - stretch * three(*reference, 0.0);
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
         let squared = squares[0] + squares[1] + squares[2];
-        if squared > result.max_displacement_squared || squared.is_nan() {
-            result.take_displacement(squared, (slice.start + index) as u32);
+        // So that NaN is found.
+        let nearer = squared <= farthest;
+        if !nearer {
+            farthest = result.take_displacement(squared, (slice.start + index) as u32);
         }
     }
 }
@@ -344,40 +378,36 @@ fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times
     W::scatter([full[0], full[1], full[2], record[11]], records, RECORD, 8);
 }
 
-/// Bring a particle back into the cell, count the images, and change its velocity with the face (BC).
-#[inline(always)]
-fn wrap(slice: &mut Slice, index: usize, motion: &StepMotion, result: &mut StepResult) {
-    let record = &mut slice.record[index];
-    let mut wraps = [0; 3];
+/// What a particle outside the cell did.
+struct Crossing {
+    /// Images crossed.
+    wraps: [i32; 3],
+    /// It went farther than it can.
+    lost: bool,
+}
+
+/// Bring a particle back into the cell, and change its velocity with the face (BC).
+fn wrap(record: &mut Record, velocity: &mut [f64; 4], reference: &mut [f64; 3], motion: &StepMotion) -> Crossing {
+    let mut crossing = Crossing { wraps: [0; 3], lost: false };
     for k in 0..3 {
         let (side, x) = (motion.sides[k], record.position[k]);
         if x >= 0.0 && x < side {
             continue;
         }
         if !motion.periodic[k] {
-            if x < -record.radius || x > side + record.radius {
-                result.lost = Some((slice.start + index) as u32);
-            }
+            crossing.lost |= x < -record.radius || x > side + record.radius;
             continue;
         }
         let (position, crossed) = wrapped(x, side);
-        if crossed.abs() > 1 {
-            result.lost = Some((slice.start + index) as u32);
-        }
+        crossing.lost |= crossed.abs() > 1;
         record.position[k] = position;
-        wraps[k] = crossed;
-        slice.velocity[index][k] -= f64::from(crossed) * motion.face_velocity[k];
-    }
-    if wraps != [0; 3] {
-        for k in 0..3 {
-            slice.image[index][k] += wraps[k];
+        crossing.wraps[k] = crossed;
+        velocity[k] -= f64::from(crossed) * motion.face_velocity[k];
+        if crossed != 0 {
+            reference[k] -= f64::from(crossed) * motion.reference_sides[k];
         }
-        for k in 0..3 {
-            slice.reference[index][k] -= f64::from(wraps[k]) * motion.reference_sides[k];
-        }
-        cross(&mut slice.crossed[index], wraps);
-        result.wrapped.push(((slice.start + index) as u32, wraps));
     }
+    crossing
 }
 
 /// Position wrapped into `[0, side)` and the images crossed (+1: left through the high face). Farther

@@ -70,10 +70,9 @@ impl Simulation {
         let ParticleState { id, species, position, radius, velocity, full_velocity, spin, .. } = state;
         let contacts: Vec<Value> = self
             .contacts
-            .ends_of(index)
-            .iter()
-            .map(|end| {
-                let (number, place) = self.contacts.locate(end.line());
+            .lines_of(index)
+            .map(|(line, _)| {
+                let (number, place) = self.contacts.locate(line);
                 let section = &self.contacts.sections[number];
                 let key = self.contacts.key(number, place, &self.particles, self.model.lists.total);
                 let mut memory = vec![0.0; section.columns];

@@ -173,7 +173,7 @@ impl Simulation {
 
     /// Number of touching contacts of an owned particle at the last look at single contacts.
     pub(super) fn touching(&self, particle: usize) -> u32 {
-        self.contacts.ends_of(particle).iter().filter(|end| self.forces[end.line()][3] > 0.0).count() as u32
+        self.contacts.lines_of(particle).filter(|(line, _)| self.forces[*line][3] > 0.0).count() as u32
     }
 
     fn mass(&self, particle: usize) -> f64 {
@@ -185,9 +185,9 @@ impl Simulation {
     fn net_force(&self, particle: usize) -> [f64; 3] {
         let mass = self.mass(particle);
         let mut sum = self.model.config.gravity.map(|g| mass * g);
-        for end in self.contacts.ends_of(particle) {
-            let sign = if end.is_second() { -1.0 } else { 1.0 };
-            for (total, force) in sum.iter_mut().zip(self.forces[end.line()]) {
+        for (line, is_second) in self.contacts.lines_of(particle) {
+            let sign = if is_second { -1.0 } else { 1.0 };
+            for (total, force) in sum.iter_mut().zip(self.forces[line]) {
                 *total += sign * force;
             }
         }

@@ -18,8 +18,8 @@ impl Simulation {
             .map(|index| {
                 let record = &self.particles.record[index];
                 let volume = ellipsoid_volume(self.particles.semi_axes(index));
-                let ends = self.contacts.ends_of(index).iter();
-                let virial = ends.fold(0.0, |sum, end| sum + virials[end.line()][usize::from(end.is_second())]);
+                let lines = self.contacts.lines_of(index);
+                let virial = lines.fold(0.0, |sum, (line, is_second)| sum + virials[line][usize::from(is_second)]);
                 SnapshotParticle {
                     id: self.particles.id[index],
                     species: self.particles.species[index],

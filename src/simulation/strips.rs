@@ -1,12 +1,12 @@
 //! The contact passes and the motion of one step over the strips of the contact list.
 
-use crate::contact::list::{CHUNK, ContactList, End, Run, Strip};
+use crate::contact::list::{CHUNK, ContactList, Reading, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::lane::{is_far, prefetch};
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
-use crate::integrate::gather::{ChunkEnds, Lines};
+use crate::integrate::gather::Lines;
 use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
 use std::ops::Range;
 
@@ -49,7 +49,7 @@ impl LineBuffers {
         self.kept.resize(cache_lines(list.kept), zero);
         self.rings.resize_with(list.strips.len(), Ring::default);
         for (ring, strip) in self.rings.iter_mut().zip(&list.strips) {
-            ring.lines.resize(cache_lines(strip.ring), zero);
+            ring.lines.resize(cache_lines(strip.slots()), zero);
         }
     }
 }
@@ -173,19 +173,12 @@ impl Phase<'_> {
         lines: &mut LineBuffers,
         motion: &StepMotion,
     ) -> (StepResult, Option<PassFault>) {
-        let per_strip = list.per_strip();
-        let ContactList { strips, sections, runs, offsets, ends, summing, kept, .. } = list;
-        let view = View {
-            runs,
-            offsets,
-            ends,
-            summing,
-            kept: &bytemuck::cast_slice(&lines.kept)[..*kept * lines.stride],
-            width: lines.width,
-            stride: lines.stride,
-        };
+        let (per_strip, kept) = (list.per_strip(), list.kept * lines.stride);
+        let (list, sections) = list.parts();
+        let view =
+            View { list, kept: &bytemuck::cast_slice(&lines.kept)[..kept], width: lines.width, stride: lines.stride };
         let work = Work {
-            strips: &strips[which.clone()],
+            strips: &list.strips[which.clone()],
             first_section: which.start * per_strip,
             sections: &mut sections[which.start * per_strip..which.end * per_strip],
         };
@@ -215,6 +208,7 @@ impl Phase<'_> {
             return (a.0, a.1.or(b.1));
         };
         let (mut result, mut fault) = (StepResult::default(), None);
+        let number = work.first_section / work.sections.len();
         let Ring { lines: ring, touches, loads } = &mut rings[0];
         let ring: &mut [f64] = bytemuck::cast_slice_mut(ring);
         let (mask, far) = (strip.ring - 1, is_far(slice.record));
@@ -222,24 +216,26 @@ impl Phase<'_> {
         for chunk in 0..strip.chunks() {
             let particles = strip.chunk(chunk);
             if far {
-                view.ask_for_ends(&particles);
+                view.list.ask_for_ends(&particles);
                 view.ask_for_lines(strip.kept_reads_of(chunk));
             }
             let from = strip.near.start + chunk * pairs;
-            for run in &view.runs[from..from + pairs] {
+            for run in &view.list.runs[from..from + pairs] {
                 let lines = LineRing { values: &mut *ring, first: run.line as usize, mask };
                 let bodies = BodyData { records: slice.record, shapes: slice.shape };
                 let found = self.evaluate(run, work.first_section, work.sections, bodies, lines, touches);
                 fault = fault.or(found);
             }
-            let lines = Lines { width: view.width, stride: view.stride, kept: view.kept, ring: &*ring, mask };
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
-            let chunk = ChunkEnds {
-                offsets: &view.offsets[particles.start..=particles.end],
-                ends: view.ends,
-                summing: &view.summing[particles],
-                near_only: usize::from(strip.near_only[chunk]),
+            let lines = Lines {
+                width: view.width,
+                stride: view.stride,
+                buffer: &mut *ring,
+                ring: strip.ring,
+                kept: view.kept,
+                reads: strip.kept_reads_of(chunk),
             };
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(strip.particles.len());
+            let chunk = view.list.ends_of(number, chunk);
             let batch = Batch { range, chunk, lines, loads, motion };
             leap_frog::advance(&mut slice, batch, &mut result);
         }
@@ -300,26 +296,15 @@ impl Phase<'_> {
     }
 }
 
-/// What the strips read of the contact list.
+/// What the strips read.
 struct View<'a> {
-    runs: &'a [Run],
-    offsets: &'a [u32],
-    ends: &'a [End],
-    summing: &'a [u8],
+    list: Reading<'a>,
     kept: &'a [f64],
     width: usize,
     stride: usize,
 }
 
 impl View<'_> {
-    /// Ask for what the sums of these particles read beside the lines, so that it is there after their contacts.
-    fn ask_for_ends(&self, particles: &Range<usize>) {
-        let [first, last] = [particles.start, particles.end].map(|particle| self.offsets[particle] as usize);
-        prefetch(self.ends, first, last - first);
-        prefetch(self.summing, particles.start, CHUNK);
-        prefetch(self.offsets, particles.end, 2 * CHUNK);
-    }
-
     /// Ask for kept lines.
     fn ask_for_lines(&self, lines: &[u32]) {
         for line in lines {

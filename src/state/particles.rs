@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Record {
-    /// Wrapped position \[m\].
+    /// Wrapped position \[m\]; no component is −0, so that differences are not.
     pub position: [f64; 3],
     /// Radius; of an ellipsoid that of the sphere around it, its largest semi-axis \[m\].
     pub radius: f64,
@@ -100,7 +100,7 @@ impl Particles {
             let [x, y, z] = state.spin;
             particles.spin.push([x, y, z, inverse_inertia]);
             particles.record.push(Record {
-                // Never −0: the contact pass counts on it.
+                // Never −0.
                 position: state.position.map(|x| x + 0.0),
                 radius: state.radius,
                 velocity: state.full_velocity,

@@ -49,7 +49,7 @@ impl<C: ContactLaw> Laws<'_, C> {
         memory: &mut [CacheLine],
         lines: &mut LineRing,
     ) {
-        let lanes = || (0..BLOCK).step_by(L::WIDTH);
+        let lanes = || (0..BLOCK / L::WIDTH).map(|group| group * L::WIDTH);
         let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
         for (block, touches) in touches.iter_mut().enumerate() {
             for lane in lanes() {

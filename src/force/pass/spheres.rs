@@ -66,32 +66,40 @@ fn geometry_of<L: Lane>(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    let (mut excess, mut unequal) = (None, false);
+    let mut excess = None;
+    let zero = L::splat(0.0);
     let limit = L::splat(input.max_overlap_fraction);
-    let lanes = || (0..BLOCK).step_by(L::WIDTH);
+    let lanes = || (0..BLOCK / L::WIDTH).map(|group| group * L::WIDTH);
+    let (first, second) = (section.first.as_chunks::<BLOCK>().0, section.second.as_chunks::<BLOCK>().0);
+    let shifts = section.shift.as_chunks::<BLOCK>().0;
+    let listed = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
     let numbers: &[f64] = bytemuck::cast_slice(records);
     let far = is_far(records);
-    for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
-        for lane in lanes() {
-            let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
-            let ahead = places.start + RECORDS_AHEAD * BLOCK..places.end + RECORDS_AHEAD * BLOCK;
-            if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {
-                for (first, second) in first.iter().zip(second) {
-                    prefetch(numbers, (*first).max(*second) as usize, RECORD);
-                }
+    let mut unequal = zero.greater(zero);
+    let listed_shifts = listed.clone().zip(&shifts[blocks.clone()]);
+    for ((block, ((first_of, second_of), shifts)), touches) in blocks.clone().zip(listed_shifts).zip(touches.iter_mut())
+    {
+        let ahead = block + RECORDS_AHEAD;
+        if far && let (Some(first), Some(second)) = (first.get(ahead), second.get(ahead)) {
+            for (first, second) in first.iter().zip(second) {
+                prefetch(numbers, (*first).max(*second) as usize, RECORD);
             }
-            let pairs = [&section.first[places.clone()], &section.second[places.clone()]];
-            let pair = geometry::relative::<L>(records, pairs, &section.shift[places], input.motion);
+        }
+        for lane in lanes() {
+            let pair = geometry::relative::<L>(
+                records,
+                [&first_of[lane..], &second_of[lane..]],
+                &shifts[lane..],
+                input.motion,
+            );
             touches.put_relative(lane, &pair, content);
-            unequal |= L::any(pair.unequal());
+            unequal = unequal | pair.unequal();
         }
     }
-    if content.rolling || unequal {
-        for (block, touches) in blocks.clone().zip(touches.iter_mut()) {
+    if content.rolling || L::any(unequal) {
+        for ((first, second), touches) in listed.zip(touches.iter_mut()) {
             for lane in lanes() {
-                let places = block * BLOCK + lane..block * BLOCK + lane + L::WIDTH;
-                let pairs = [&section.first[places.clone()], &section.second[places]];
-                touches.put_relative_spin(lane, &L::relative_spin(records, pairs));
+                touches.put_relative_spin(lane, &L::relative_spin(records, [&first[lane..], &second[lane..]]));
             }
         }
     }
