@@ -63,7 +63,7 @@ pub struct Relative<L> {
     pub imposed_velocity: Vector<L>,
     /// ω_i + ω_j \[rad/s\].
     pub spin_sum: Vector<L>,
-    /// ω_j − ω_i \[rad/s\]; not set by [`relative`].
+    /// ω_j − ω_i \[rad/s\]; not set by [`Relative::of`].
     pub relative_spin: Vector<L>,
     /// R_j − R_i \[m\].
     pub radius_difference: L,
@@ -98,35 +98,46 @@ impl<L: Lane> PairTouch<L> {
     }
 }
 
-/// Some pairs of spheres at these offsets, the second ones in the images of their packed shifts; without
-/// `relative_spin`, which between equal spheres only rolling laws need.
-///
-/// # Source
-/// PHYSICS.md section 1.
-#[inline(always)]
-#[must_use]
-pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
-    let [[x, y, z, radius_difference], [vx, vy, vz, inverse_masses], [wx, wy, wz, radius_sum]] =
-        L::relative(records, pairs);
-    let mut branch = [x, y, z];
-    // Away from periodic faces there is nothing to look up and nothing to add, as no component is −0.
-    if !shift::all_here(&codes[..L::WIDTH]) {
-        branch = add(branch, image(&motion.shift, codes));
+impl<L: Lane> Relative<L> {
+    /// Some pairs of spheres at these offsets, in no image yet and without what the cell imposes; without
+    /// `relative_spin`, which between equal spheres only rolling laws need.
+    ///
+    /// # Source
+    /// PHYSICS.md section 1.
+    #[inline(always)]
+    #[must_use]
+    pub fn of(records: &[Record], pairs: [&[u32]; 2]) -> Self {
+        let [[x, y, z, radius_difference], [vx, vy, vz, inverse_masses], [wx, wy, wz, radius_sum]] =
+            L::relative(records, pairs);
+        Self {
+            branch: [x, y, z],
+            velocity: [vx, vy, vz],
+            imposed_velocity: [L::splat(0.0); 3],
+            spin_sum: [wx, wy, wz],
+            relative_spin: [L::splat(0.0); 3],
+            radius_difference,
+            radius_sum,
+            inverse_masses,
+        }
     }
-    let [gx, gy, gz] = motion.gradient;
-    let mut imposed_velocity = [L::splat(gx) * branch[0], L::splat(gy) * branch[1], L::splat(gz) * branch[2]];
-    if motion.faces_move {
-        imposed_velocity = add(imposed_velocity, image(&motion.shift_velocity, codes));
+
+    /// Bring the second ones into the images of their packed shifts. Where all are 0 this changes nothing (no component
+    /// of a branch vector is −0), unless the faces move.
+    #[inline(always)]
+    pub fn enter_images(&mut self, codes: &[u16], motion: &CellMotion) {
+        self.branch = add(self.branch, image(&motion.shift, codes));
+        if motion.faces_move {
+            self.imposed_velocity = image(&motion.shift_velocity, codes);
+        }
     }
-    Relative {
-        branch,
-        velocity: add([vx, vy, vz], imposed_velocity),
-        imposed_velocity,
-        spin_sum: [wx, wy, wz],
-        relative_spin: [L::splat(0.0); 3],
-        radius_difference,
-        radius_sum,
-        inverse_masses,
+
+    /// Add to the velocity what the cell's motion imposes.
+    #[inline(always)]
+    pub fn follow_cell(&mut self, motion: &CellMotion) {
+        let [gx, gy, gz] = motion.gradient;
+        let affine = [L::splat(gx) * self.branch[0], L::splat(gy) * self.branch[1], L::splat(gz) * self.branch[2]];
+        self.imposed_velocity = if motion.faces_move { add(affine, self.imposed_velocity) } else { affine };
+        self.velocity = add(self.velocity, self.imposed_velocity);
     }
 }
 
@@ -134,9 +145,11 @@ pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], 
 /// `a_i = R_i − δ/2 = ½ (d − (R_j − R_i))` from i, d the distance. NaN counts as touching, so that it is found.
 ///
 /// The surfaces turn past each other with `(a_i ω_i + a_j ω_j) × n = ½ (ω_i + ω_j) × d n + ½ (R_j − R_i)(ω_j − ω_i) × n`.
+///
+/// `mixed`: some pairs may have unequal radii.
 #[inline(always)]
 #[must_use]
-pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
+pub fn touch<L: Lane>(pair: &Relative<L>, mixed: bool) -> PairTouch<L> {
     let (branch, sum, difference, half) = (pair.branch, pair.radius_sum, pair.radius_difference, L::splat(0.5));
     let distance = dot(branch, branch).sqrt();
     let overlap = sum - distance;
@@ -148,7 +161,7 @@ pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
     let mut arms = [half * distance; 2];
     let mut min_radius = half * sum;
     let unequal = pair.unequal();
-    if L::any(unequal) {
+    if mixed && L::any(unequal) {
         // By lane, so that a pair's bits do not hang on the pairs beside it.
         let more = scale(cross(pair.relative_spin, normal), half * difference);
         for k in 0..3 {
@@ -182,11 +195,26 @@ pub fn touch<L: Lane>(pair: &Relative<L>) -> PairTouch<L> {
     }
 }
 
+/// Some pairs of spheres at these offsets, the second ones in the images of their packed shifts, with what the cell
+/// imposes; without `relative_spin`.
+#[inline(always)]
+#[must_use]
+pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
+    let mut pair = Relative::of(records, pairs);
+    // Away from periodic faces there is nothing to look up.
+    if motion.faces_move || !shift::all_here(&codes[..L::WIDTH]) {
+        pair.enter_images(codes, motion);
+    }
+    pair.follow_cell(motion);
+    pair
+}
+
 /// Touches of some pairs of spheres, see [`relative`].
 #[inline(always)]
 #[must_use]
 pub fn spheres<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
-    touch(&Relative { relative_spin: L::relative_spin(records, pairs), ..relative(records, pairs, codes, motion) })
+    let pair = Relative { relative_spin: L::relative_spin(records, pairs), ..relative(records, pairs, codes, motion) };
+    touch(&pair, true)
 }
 
 /// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves

@@ -57,7 +57,7 @@ pub struct BlockTouches {
     normal: Numbers<3>,
     /// Relative spin, if there is rolling or radii are unequal.
     relative_spin: Numbers<3>,
-    /// Imposed velocity, if there is a ledger.
+    /// Imposed velocity, if faces move or there is a ledger.
     imposed_velocity: Numbers<3>,
     /// Energies of the normal law, if there is a ledger.
     energies: Numbers<4>,
@@ -74,16 +74,20 @@ impl BlockTouches {
         energies: Numbers::ZERO,
     };
 
-    /// Take in the bodies of the lanes from `lane` on.
+    /// Take in the bodies of the lanes from `lane` on, without what the cell imposes.
     #[inline(always)]
-    pub fn put_relative<L: Lane>(&mut self, lane: usize, pair: &Relative<L>, content: Content) {
+    pub fn put_relative<L: Lane>(&mut self, lane: usize, pair: &Relative<L>) {
         self.relative.put(0, lane, &pair.branch);
         self.relative.put(3, lane, &pair.velocity);
         self.relative.put(6, lane, &pair.spin_sum);
         self.relative.put(9, lane, &[pair.radius_difference, pair.radius_sum, pair.inverse_masses]);
-        if content.ledger {
-            self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
-        }
+    }
+
+    /// Take in the branch vectors of the lanes from `lane` on again, and the imposed velocity.
+    #[inline(always)]
+    pub fn put_images<L: Lane>(&mut self, lane: usize, pair: &Relative<L>) {
+        self.relative.put(0, lane, &pair.branch);
+        self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
     }
 
     /// Take in ω_j − ω_i \[rad/s\] of the lanes from `lane` on.
@@ -110,13 +114,16 @@ impl BlockTouches {
 
     /// Take in the touches of the lanes from `lane` on.
     #[inline(always)]
-    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>, range: f64) {
+    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>, content: Content) {
         let touch = &pair.touch;
-        let overlap = L::select(pair.alive(range), touch.overlap, L::splat(DEAD));
+        let overlap = L::select(pair.alive(content.range), touch.overlap, L::splat(DEAD));
         self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_radius, touch.effective_mass]);
         self.touch.put(4, lane, &touch.normal);
         self.touch.put(7, lane, &touch.slip_velocity);
         self.touch.put(10, lane, &[touch.spin_about_normal, pair.arm_first, pair.arm_second]);
+        if content.ledger {
+            self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
+        }
     }
 
     /// The touches of the lanes from `lane` on; what is not passed on means nothing.

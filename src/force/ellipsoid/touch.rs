@@ -133,7 +133,7 @@ impl Source<'_> {
         };
         let round = shapes[0].is_sphere() & shapes[1].is_sphere();
         if !L::any(!round) {
-            return EllipsoidTouch::of_spheres(geometry::touch(&bodies));
+            return EllipsoidTouch::of_spheres(geometry::touch(&bodies, true));
         }
         let memory = self.block * self.section.columns + self.normals;
         let stored = vector_at(&self.section.memory[memory..memory + 3], lane);
@@ -142,7 +142,7 @@ impl Source<'_> {
         if !L::any(round) {
             return touch;
         }
-        let of_spheres = EllipsoidTouch::of_spheres(geometry::touch(&bodies));
+        let of_spheres = EllipsoidTouch::of_spheres(geometry::touch(&bodies, true));
         // By lane and not by block: a pair's bits must not hang on the pairs beside it.
         let mut numbers = touch.numbers();
         for (number, of_spheres) in numbers.iter_mut().zip(of_spheres.numbers()) {

@@ -61,9 +61,10 @@ impl<C: ContactLaw> Laws<'_, C> {
             }
         }
         for (block, touches) in touches.iter().enumerate() {
+            let slot = ((lines.first + block * BLOCK) & lines.mask) * self.stride;
+            let rows = &mut lines.values[slot..slot + BLOCK * self.stride];
             for lane in lanes() {
-                let slot = ((lines.first + block * BLOCK + lane) & lines.mask) * self.stride;
-                let rows = &mut lines.values[slot..slot + L::WIDTH * self.stride];
+                let rows = &mut rows[lane * self.stride..];
                 let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
                 let rest = C::NORMAL_MEMORY..C::MEMORY;
                 let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
@@ -99,13 +100,15 @@ impl<C: ContactLaw> Laws<'_, C> {
     ) {
         let zero = L::splat(0.0);
         let kept = |value: L| L::select(pair.alive, value, zero);
-        let force = sub(response.tangential_force, scale(pair.touch.normal, response.normal_force));
+        // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
+        let tangential = response.tangential_force.map(kept);
+        let force = sub(tangential, scale(pair.touch.normal, kept(response.normal_force)));
         let stride = self.stride;
-        L::scatter([kept(force[0]), kept(force[1]), kept(force[2]), kept(pair.arm_first)], rows, stride, 0);
+        L::scatter([force[0], force[1], force[2], pair.arm_first], rows, stride, 0);
         let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
         if own >= 8 {
-            let turning = cross(pair.touch.normal, response.tangential_force);
-            L::scatter([kept(turning[0]), kept(turning[1]), kept(turning[2]), kept(pair.arm_second)], rows, stride, 4);
+            let turning = cross(pair.touch.normal, tangential);
+            L::scatter([turning[0], turning[1], turning[2], pair.arm_second], rows, stride, 4);
         }
         if own >= 12 {
             let moment = response.moment;

@@ -2,7 +2,8 @@
 
 use super::{Excess, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, Section};
-use crate::force::geometry;
+use crate::contact::shift;
+use crate::force::geometry::{self, PairTouch, Relative};
 use crate::force::lane::{Lane, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
@@ -66,19 +67,15 @@ fn geometry_of<L: Lane>(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    let mut excess = None;
-    let zero = L::splat(0.0);
-    let limit = L::splat(input.max_overlap_fraction);
     let lanes = || (0..BLOCK / L::WIDTH).map(|group| group * L::WIDTH);
     let (first, second) = (section.first.as_chunks::<BLOCK>().0, section.second.as_chunks::<BLOCK>().0);
-    let shifts = section.shift.as_chunks::<BLOCK>().0;
-    let listed = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
+    let pairs = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
+    let codes = &section.shift.as_chunks::<BLOCK>().0[blocks.clone()];
     let numbers: &[f64] = bytemuck::cast_slice(records);
-    let far = is_far(records);
-    let mut unequal = zero.greater(zero);
-    let listed_shifts = listed.clone().zip(&shifts[blocks.clone()]);
-    for ((block, ((first_of, second_of), shifts)), touches) in blocks.clone().zip(listed_shifts).zip(touches.iter_mut())
-    {
+    let (motion, far) = (input.motion, is_far(records));
+    let never = L::splat(0.0).greater(L::splat(0.0));
+    let mut unequal = never;
+    for (((block, pair), codes), touches) in blocks.clone().zip(pairs.clone()).zip(codes).zip(touches.iter_mut()) {
         let ahead = block + RECORDS_AHEAD;
         if far && let (Some(first), Some(second)) = (first.get(ahead), second.get(ahead)) {
             for (first, second) in first.iter().zip(second) {
@@ -86,34 +83,53 @@ fn geometry_of<L: Lane>(
             }
         }
         for lane in lanes() {
-            let pair = geometry::relative::<L>(
-                records,
-                [&first_of[lane..], &second_of[lane..]],
-                &shifts[lane..],
-                input.motion,
-            );
-            touches.put_relative(lane, &pair, content);
+            let pair = Relative::<L>::of(records, [&pair.0[lane..], &pair.1[lane..]]);
+            touches.put_relative(lane, &pair);
             unequal = unequal | pair.unequal();
         }
-    }
-    if content.rolling || L::any(unequal) {
-        for ((first, second), touches) in listed.zip(touches.iter_mut()) {
+        // Away from periodic faces there is nothing to look up.
+        if motion.faces_move || !shift::all_here(codes) {
             for lane in lanes() {
-                touches.put_relative_spin(lane, &L::relative_spin(records, [&first[lane..], &second[lane..]]));
+                let mut pair = touches.relative::<L>(lane);
+                pair.enter_images(&codes[lane..], motion);
+                touches.put_images(lane, &pair);
             }
         }
     }
-    for (block, touches) in blocks.zip(touches) {
+    let unequal = L::any(unequal);
+    if content.rolling || unequal {
+        for (pair, touches) in pairs.zip(touches.iter_mut()) {
+            for lane in lanes() {
+                let spin = L::relative_spin(records, [&pair.0[lane..], &pair.1[lane..]]);
+                touches.put_relative_spin(lane, &spin);
+            }
+        }
+    }
+    let touch = |touches: &BlockTouches, lane: usize| {
+        let mut pair = touches.relative::<L>(lane);
+        pair.follow_cell(motion);
+        geometry::touch(&pair, unequal)
+    };
+    // Written so that NaN counts as a fault.
+    let limit = L::splat(input.max_overlap_fraction);
+    let beyond = |pair: &PairTouch<L>| pair.touching & !(limit * pair.min_radius).at_least(pair.touch.overlap);
+    let mut faulty = never;
+    let touches = &mut touches[..blocks.len()];
+    for touches in &mut *touches {
         for lane in lanes() {
-            let pair = geometry::touch(&touches.relative::<L>(lane));
-            touches.put_touch(lane, &pair, content.range);
-            // Written so that NaN counts as a fault.
-            let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
-            if excess.is_none() && L::any(pair.touching & !within) {
-                let (fraction, place) = (input.max_overlap_fraction, block * BLOCK + lane);
-                excess = first_excess(pair.touching, pair.touch.overlap, pair.min_radius, fraction, place);
-            }
+            let pair = touch(touches, lane);
+            touches.put_touch(lane, &pair, content);
+            faulty = faulty | beyond(&pair);
         }
     }
-    excess
+    if !L::any(faulty) {
+        return None;
+    }
+    blocks.zip(touches).find_map(|(block, touches)| {
+        lanes().find_map(|lane| {
+            let pair = touch(touches, lane);
+            let (overlap, place) = (pair.touch.overlap, block * BLOCK + lane);
+            first_excess(pair.touching, overlap, pair.min_radius, input.max_overlap_fraction, place)
+        })
+    })
 }
