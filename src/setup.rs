@@ -11,7 +11,7 @@ use crate::exchange::{
     Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum, redistribute,
 };
 use crate::force::cautions::{self, Sizes};
-use crate::force::pass;
+use crate::force::pass::{self, Bodies};
 use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
@@ -158,10 +158,15 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         })
         .collect();
     let extremes = extremes(comm, &species, &initial.particles);
-    let passes: Vec<_> = config.pairs.iter().map(|pair| pass::build(pair, extremes.ellipsoids)).collect();
+    let bodies = match extremes.sizes {
+        _ if extremes.ellipsoids => Bodies::Ellipsoids,
+        Sizes { smallest, .. } if smallest == extremes.max_radius => Bodies::EqualSpheres,
+        _ => Bodies::Spheres,
+    };
+    let passes: Vec<_> = config.pairs.iter().map(|pair| pass::build(pair, bodies)).collect();
     let static_passes = if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
         let damped = config.pairs.iter().map(|pair| artificially_damped(pair, config.quasi_static.restitution));
-        damped.map(|pair| pass::build(&pair, extremes.ellipsoids)).collect()
+        damped.map(|pair| pass::build(&pair, bodies)).collect()
     } else {
         Vec::new()
     };

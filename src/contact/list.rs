@@ -97,18 +97,12 @@ impl End {
     pub fn number(self) -> usize {
         (self.0 >> 3) as usize
     }
-    /// 0 at the contact's first, 4 at its second: where the numbers of the second follow four places after those
-    /// of the first.
+    /// 0 at the contact's first, 4 at its second: in a line the torque on the second follows four places after that
+    /// on the first.
     #[inline(always)]
     #[must_use]
     pub fn side(self) -> usize {
         (self.0 & 4) as usize
-    }
-    /// Where the numbers of the end's side begin among lines of `STRIDE` numbers: its line and [`Self::side`].
-    #[inline(always)]
-    #[must_use]
-    pub fn start<const STRIDE: usize>(self) -> usize {
-        if STRIDE == 8 { self.0 as usize } else { self.number() * STRIDE + self.side() }
     }
     /// The particle is the contact's second.
     #[inline(always)]

@@ -36,8 +36,7 @@ const LIST_AHEAD: usize = 2 * RECORDS_AHEAD;
 pub struct PassInput<'a> {
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (forces), 8 (with torques), 12 (with rolling moments), 16 (two torques, between
-    /// ellipsoids), then the ledger's.
+    /// Numbers per output line: 4 (force), 8 (with one torque for both bodies), 12 (with one for each), then the ledger's.
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
@@ -52,8 +51,8 @@ pub struct PassInput<'a> {
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, arm_first, n×F, arm_second, M, 0}`, F the force on the first; between
-    /// ellipsoids `{F, 0, T_first, 0, T_second, 0, 0, 0, 0, 0}`; then the ledger's
+    /// Lines, `stride` numbers each: `{F, 0, T, 0}`, F the force on the first, T the torque on each of two spheres of
+    /// equal radii; otherwise `{F, 0, T_first, 0, T_second, 0}`; then the ledger's
     /// `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
     /// Number of the first block's first line, a multiple of eight.
@@ -124,27 +123,35 @@ pub trait PairPass: Send + Sync {
     );
 }
 
-struct LawPass<C> {
-    law: C,
-    /// There are ellipsoids.
-    ellipsoids: bool,
+/// What the particles of all ranks are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bodies {
+    /// Spheres, all of one radius.
+    EqualSpheres,
+    /// Spheres.
+    Spheres,
+    /// Ellipsoids, spheres among them.
+    Ellipsoids,
 }
 
-struct Builder {
-    ellipsoids: bool,
+struct LawPass<C> {
+    law: C,
+    bodies: Bodies,
 }
+
+struct Builder(Bodies);
 
 impl LawVisitor for Builder {
     type Output = Box<dyn PairPass>;
     fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        Box::new(LawPass { law, ellipsoids: self.ellipsoids })
+        Box::new(LawPass { law, bodies: self.0 })
     }
 }
 
-/// The pass for a configured pair of materials, in a run with or without ellipsoids.
+/// The pass for a configured pair of materials.
 #[must_use]
-pub fn build(pair: &PairConfig, ellipsoids: bool) -> Box<dyn PairPass> {
-    composition::visit(pair, Builder { ellipsoids })
+pub fn build(pair: &PairConfig, bodies: Bodies) -> Box<dyn PairPass> {
+    composition::visit(pair, Builder(bodies))
 }
 
 impl<C: ContactLaw> PairPass for LawPass<C> {
@@ -157,20 +164,19 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
 
     fn columns(&self) -> Vec<Column> {
         let mut columns = self.law.columns();
-        if self.ellipsoids {
+        if self.bodies == Bodies::Ellipsoids {
             columns.extend(ellipsoids::normal_columns());
         }
         columns
     }
 
     fn stride(&self) -> usize {
-        if self.ellipsoids {
-            return ellipsoids::WIDTH;
-        }
-        match (C::TANGENTIAL, C::ROLLING) {
-            (_, true) => 12,
-            (true, false) => 8,
-            (false, false) => 4,
+        match (self.bodies, C::TANGENTIAL) {
+            (Bodies::Ellipsoids, _) => 12,
+            _ if C::ROLLING => 12,
+            (_, false) => 4,
+            (Bodies::Spheres, true) => 12,
+            (Bodies::EqualSpheres, true) => 8,
         }
     }
 
@@ -197,7 +203,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
     }
 
     fn run(&self, job: Job) -> Excess {
-        if self.ellipsoids {
+        if self.bodies == Bodies::Ellipsoids {
             return self.run_ellipsoids(job);
         }
         if job.section.partners == Partners::Wall {
@@ -251,7 +257,7 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         blocks: Range<usize>,
         observed: &mut Observed,
     ) {
-        if self.ellipsoids {
+        if self.bodies == Bodies::Ellipsoids {
             self.observe_ellipsoids(input, bodies, section, blocks, observed);
             return;
         }

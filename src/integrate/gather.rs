@@ -9,7 +9,7 @@ use crate::force::pass::LEDGER_STRIDE;
 /// Output lines of the contact passes as the particles of one chunk see them.
 #[derive(Debug)]
 pub struct Lines<'a> {
-    /// Numbers per line that hold forces, torques and moments: 4, 8, 12, or 16 between ellipsoids.
+    /// Numbers per line that hold force and torques: 4, 8 or 12.
     pub width: usize,
     /// Numbers per line, with the ledger's.
     pub stride: usize,
@@ -32,11 +32,9 @@ impl Lines<'_> {
             (4, 4) => self.sums::<L, 4, 4>(chunk, loads),
             (8, 8) => self.sums::<L, 8, 8>(chunk, loads),
             (12, 12) => self.sums::<L, 12, 12>(chunk, loads),
-            (16, 16) => self.sums::<L, 16, 16>(chunk, loads),
             (4, _) => self.sums::<L, 4, { 4 + LEDGER_STRIDE }>(chunk, loads),
             (8, _) => self.sums::<L, 8, { 8 + LEDGER_STRIDE }>(chunk, loads),
-            (12, _) => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(chunk, loads),
-            _ => self.sums::<L, 16, { 16 + LEDGER_STRIDE }>(chunk, loads),
+            _ => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(chunk, loads),
         }
     }
 
@@ -85,24 +83,18 @@ unsafe fn sum<L: Lane, const WIDTH: usize, const STRIDE: usize>(
     signs: &[f64; 5],
     numbers: &[f64],
 ) -> [f64; 8] {
+    const { assert!(WIDTH <= STRIDE) };
     let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
     for end in ends {
-        let (line, side) = (end.number() * STRIDE, end.start::<STRIDE>());
-        // SAFETY: as the function's; no part of a line is longer than `STRIDE`, and 8 where sides differ.
-        let four = |start: usize| unsafe { L::load(numbers.get_unchecked(start..start + 4)) };
-        let sign = L::splat(signs[end.side()]);
-        force = force + sign * four(line);
-        if WIDTH == 16 {
-            torque = torque + four(side + 4);
-            continue;
+        let line = end.number() * STRIDE;
+        // SAFETY: as the function's; all that is read lies within the line's `WIDTH` numbers.
+        let four = |start: usize| unsafe { L::load(numbers.get_unchecked(line + start..line + start + 4)) };
+        force = force + L::splat(signs[end.side()]) * four(0);
+        if WIDTH == 8 {
+            torque = torque + four(4);
         }
-        if WIDTH >= 8 {
-            // SAFETY: as above.
-            let arm = unsafe { *numbers.get_unchecked(side + 3) };
-            torque = torque + L::splat(arm) * four(line + 4);
-        }
-        if WIDTH >= 12 {
-            torque = torque + sign * four(line + 8);
+        if WIDTH == 12 {
+            torque = torque + four(4 + end.side());
         }
     }
     let mut load = [0.0; 8];

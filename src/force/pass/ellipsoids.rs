@@ -14,9 +14,6 @@ use crate::force::simd::Simd;
 use crate::state::particles::RECORD;
 use std::ops::Range;
 
-/// Numbers of an output line: force and the torques on both bodies, four places each, and four empty ones.
-pub const WIDTH: usize = 16;
-
 /// The stored normal, behind the law's own memory: where the search for the common normal starts in the next step.
 pub fn normal_columns() -> impl Iterator<Item = Column> {
     ["x", "y", "z"].into_iter().map(|axis| Column { name: format!("contact_normal_{axis}"), unit: "1" })
@@ -152,7 +149,6 @@ impl<C: ContactLaw> LawPass<C> {
         L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
         L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
         L::scatter([-second[0], -second[1], -second[2], zero], rows, stride, 8);
-        L::scatter([zero; 4], rows, stride, 12);
         if input.ledger {
             let own = stride - LEDGER_STRIDE;
             let kept = |value: L| L::select(alive, value, zero);

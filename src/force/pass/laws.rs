@@ -4,7 +4,7 @@ use super::{LEDGER_STRIDE, LineRing};
 use crate::contact::section::{BLOCK, CacheLine};
 use crate::force::composition::MAX_MEMORY;
 use crate::force::geometry::PairTouch;
-use crate::force::lane::{Lane, cross, dot, scale, sub};
+use crate::force::lane::{Lane, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{ContactLaw, ContactResponse};
@@ -104,15 +104,20 @@ impl<C: ContactLaw> Laws<'_, C> {
         let tangential = response.tangential_force.map(kept);
         let force = sub(tangential, scale(pair.touch.normal, kept(response.normal_force)));
         let stride = self.stride;
-        L::scatter([force[0], force[1], force[2], pair.arm_first], rows, stride, 0);
+        L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
         let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
         if own >= 8 {
             let turning = cross(pair.touch.normal, tangential);
-            L::scatter([turning[0], turning[1], turning[2], pair.arm_second], rows, stride, 4);
-        }
-        if own >= 12 {
-            let moment = response.moment;
-            L::scatter([kept(moment[0]), kept(moment[1]), kept(moment[2]), zero], rows, stride, 8);
+            let mut first = scale(turning, pair.arm_first);
+            let mut second = scale(turning, pair.arm_second);
+            if C::ROLLING {
+                let moment = response.moment.map(kept);
+                (first, second) = (add(first, moment), sub(second, moment));
+            }
+            L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
+            if own >= 12 {
+                L::scatter([second[0], second[1], second[2], zero], rows, stride, 8);
+            }
         }
         if LEDGER {
             // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
