@@ -7,9 +7,9 @@
 //! particles, whose contacts are then complete. So the output lines of contacts within the strip are
 //! needed for a short while only and live in a ring buffer; those of all other contacts are kept for the step.
 
+use super::ends::{End, Reading};
 use super::section::{BLOCK, PARTNERS, Partners, Section};
 use super::shift;
-use crate::force::lane::prefetch;
 use crate::state::ContactKey;
 use crate::state::particles::Particles;
 use rayon::prelude::*;
@@ -45,7 +45,7 @@ pub struct Strip {
     /// Lines that the ring must hold, a power of two.
     pub ring: usize,
     /// See [`Strip::slots`]; more than the number of each end of the strip's particles.
-    slots: usize,
+    pub(super) slots: usize,
     /// Kept lines that the particles' sums read, chunk by chunk.
     pub kept_reads: Vec<u32>,
     /// For each chunk the end of its part of `kept_reads`.
@@ -81,77 +81,6 @@ impl Strip {
     }
 }
 
-/// One end of a contact as its particle sees it: a number and the side. The number is the slot of the strip's buffer
-/// where the sums find the output line; of a ghost, which nobody sums here, the line's own. Up to 2^29 lines per rank.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct End(u32);
-
-impl End {
-    /// `second`: the particle is the contact's second.
-    fn new(number: usize, second: bool) -> Self {
-        Self((number as u32) << 3 | u32::from(second) << 2)
-    }
-    /// Slot or line.
-    #[inline(always)]
-    #[must_use]
-    pub fn number(self) -> usize {
-        (self.0 >> 3) as usize
-    }
-    /// 0 at the contact's first, 4 at its second: in a line the torque on the second follows four places after that
-    /// on the first.
-    #[inline(always)]
-    #[must_use]
-    pub fn side(self) -> usize {
-        (self.0 & 4) as usize
-    }
-    /// The particle is the contact's second.
-    #[inline(always)]
-    #[must_use]
-    pub fn is_second(self) -> bool {
-        self.side() != 0
-    }
-}
-
-/// The ends of the particles of one chunk.
-#[derive(Debug, Clone, Copy)]
-pub struct ChunkEnds<'a> {
-    /// Of the chunk's particles and one more, rising, none beyond `ends`.
-    offsets: &'a [u32],
-    ends: &'a [End],
-    /// Places within the chunk, each less than the number of its particles.
-    summing: &'a [u8],
-    slots: usize,
-}
-
-impl<'a> ChunkEnds<'a> {
-    /// The ends of the particle at this place of the chunk.
-    #[inline(always)]
-    #[must_use]
-    pub fn of(&self, place: usize) -> &'a [End] {
-        &self.ends[self.offsets[place] as usize..self.offsets[place + 1] as usize]
-    }
-
-    /// The chunk's places in the order of summing, each with its ends.
-    #[inline(always)]
-    pub fn in_order(self) -> impl Iterator<Item = (usize, &'a [End])> {
-        self.summing.iter().map(move |place| {
-            let place = usize::from(*place);
-            // SAFETY: [`ContactList::index`] makes what the fields promise, and nobody else can change it.
-            let ends = unsafe {
-                let (from, to) = (self.offsets.get_unchecked(place), self.offsets.get_unchecked(place + 1));
-                self.ends.get_unchecked(*from as usize..*to as usize)
-            };
-            (place, ends)
-        })
-    }
-
-    /// More than the number of any of the ends, see [`Strip::slots`].
-    #[must_use]
-    pub fn slots(&self) -> usize {
-        self.slots
-    }
-}
-
 /// All contacts of a rank and, per local particle (owned and ghost), its ends in order of (partner
 /// id, image shift seen from the particle): the order in which forces are summed on every rank.
 #[derive(Debug, Clone, Default)]
@@ -177,41 +106,6 @@ pub struct ContactList {
     /// For each owned particle a place within its chunk: the order in which the chunk's particles are summed up, by the
     /// number of contacts, so that the processor foresees how often the loop over them runs.
     summing: Vec<u8>,
-}
-
-/// What a step reads of a contact list.
-#[derive(Debug, Clone, Copy)]
-pub struct Reading<'a> {
-    /// As [`ContactList::strips`].
-    pub strips: &'a [Strip],
-    /// As [`ContactList::runs`].
-    pub runs: &'a [Run],
-    offsets: &'a [u32],
-    ends: &'a [End],
-    summing: &'a [u8],
-}
-
-impl<'a> Reading<'a> {
-    /// The ends of the particles of a strip's chunk.
-    #[must_use]
-    pub fn ends_of(&self, strip: usize, chunk: usize) -> ChunkEnds<'a> {
-        let strip = &self.strips[strip];
-        let particles = strip.chunk(chunk);
-        ChunkEnds {
-            offsets: &self.offsets[particles.start..=particles.end],
-            ends: self.ends,
-            summing: &self.summing[particles],
-            slots: strip.slots,
-        }
-    }
-
-    /// Ask for what [`Self::ends_of`] gives, and for the offsets of the chunk after.
-    pub fn ask_for_ends(&self, particles: &Range<usize>) {
-        let [first, last] = [particles.start, particles.end].map(|particle| self.offsets[particle] as usize);
-        prefetch(self.ends, first, last - first);
-        prefetch(self.summing, particles.start, CHUNK);
-        prefetch(self.offsets, particles.end, 2 * CHUNK);
-    }
 }
 
 impl ContactList {
@@ -417,7 +311,7 @@ impl ContactList {
             offsets[particle + 2] += offsets[particle + 1];
         }
         // Not kept: it is larger than the list itself.
-        let mut keyed = vec![(0_u64, End(0)); offsets[locals + 1] as usize];
+        let mut keyed = vec![(0_u64, End::new(0, false)); offsets[locals + 1] as usize];
         let mut place_end = |particle: usize, key: u64, end: End| {
             let slot = &mut offsets[particle + 1];
             keyed[*slot as usize] = (key, end);
@@ -440,7 +334,7 @@ impl ContactList {
         }
         offsets.pop();
         ends.clear();
-        ends.resize(keyed.len(), End(0));
+        ends.resize(keyed.len(), End::new(0, false));
         sort_ends(offsets, &mut keyed, ends);
     }
 }

@@ -2,6 +2,7 @@
 //! forces beyond the width of the memory.
 
 pub mod build;
+pub mod ends;
 pub mod list;
 pub mod section;
 pub mod shift;

@@ -1,7 +1,8 @@
 //! Sum of the contact forces and torques on a particle, in order of (partner id, image shift), so
 //! that every rank and thread count gives the same bits.
 
-use crate::contact::list::{CHUNK, ChunkEnds, End};
+use crate::contact::ends::{ChunkEnds, End};
+use crate::contact::list::CHUNK;
 use crate::force::lane::Lane;
 use crate::force::observe::CONTACT_LEDGER;
 use crate::force::pass::LEDGER_STRIDE;

@@ -5,7 +5,8 @@
 
 use super::gather::Lines;
 use super::rotation::{Body, Rotation, Spins};
-use crate::contact::list::{CHUNK, ChunkEnds};
+use crate::contact::ends::ChunkEnds;
+use crate::contact::list::CHUNK;
 use crate::contact::section::BLOCK;
 use crate::force::lane::portable::Portable;
 use crate::force::lane::{Lane, SHAPE, prefetch};

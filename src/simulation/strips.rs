@@ -1,6 +1,7 @@
 //! The contact passes and the motion of one step over the strips of the contact list.
 
-use crate::contact::list::{CHUNK, ContactList, Reading, Run, Strip};
+use crate::contact::ends::Reading;
+use crate::contact::list::{CHUNK, ContactList, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::lane::{is_far, prefetch};
 use crate::force::observe::{Observation, Observed, Wanted};
@@ -216,7 +217,7 @@ impl Phase<'_> {
         for chunk in 0..strip.chunks() {
             let particles = strip.chunk(chunk);
             if far {
-                view.list.ask_for_ends(&particles);
+                view.ask_for_ends(&particles);
                 view.ask_for_lines(strip.kept_reads_of(chunk));
             }
             let from = strip.near.start + chunk * pairs;
@@ -305,6 +306,15 @@ struct View<'a> {
 }
 
 impl View<'_> {
+    /// Ask for what the sums of these particles read beside the lines, so that it is there after their contacts.
+    fn ask_for_ends(&self, particles: &Range<usize>) {
+        let (offsets, ends, summing) = self.list.arrays();
+        let [first, last] = [particles.start, particles.end].map(|particle| offsets[particle] as usize);
+        prefetch(ends, first, last - first);
+        prefetch(summing, particles.start, CHUNK);
+        prefetch(offsets, particles.end, 2 * CHUNK);
+    }
+
     /// Ask for kept lines.
     fn ask_for_lines(&self, lines: &[u32]) {
         for line in lines {
