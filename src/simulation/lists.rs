@@ -2,7 +2,8 @@
 //! skin, and inside it the contact list with a thin one.
 
 use super::{Model, Simulation, Stage};
-use crate::error::Result;
+use crate::contact::ends::MAX_LINES;
+use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
@@ -83,7 +84,7 @@ impl Simulation {
             self.timers.start(Stage::Neighbours);
             self.update_ghosts();
             self.budget.displaced = displaced;
-            self.rebuild_contacts();
+            self.rebuild_contacts()?;
             self.timers.contact_rebuilds += 1;
             self.timers.stop();
         }
@@ -131,7 +132,7 @@ impl Simulation {
         strips.extend(self.cut(inner..self.particles.owned));
         self.model.lists.start(&mut self.contacts, &self.particles, &mut self.candidates, strips, inner_strips);
         self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0 };
-        self.rebuild_contacts();
+        self.rebuild_contacts()?;
         self.model.lists.restore(&mut self.contacts, &self.particles, &memory);
         Ok(())
     }
@@ -144,12 +145,21 @@ impl Simulation {
         (0..parts).map(|part| bound(part)..bound(part + 1)).filter(|range| !range.is_empty()).collect()
     }
 
-    fn rebuild_contacts(&mut self) {
+    fn rebuild_contacts(&mut self) -> Result<()> {
         let sides = self.global.sides;
         self.budget.reference_sides = sides;
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
+        let mut lines = [self.contacts.lines as f64];
+        self.comm.max_f64(&mut lines);
+        if lines[0] > MAX_LINES as f64 {
+            return Err(Error::Input(format!(
+                "{} contacts listed on one rank are more than it can number ({MAX_LINES}); start more ranks",
+                lines[0]
+            )));
+        }
         self.lines.fit(&self.contacts);
         self.reference.take(&self.particles);
+        Ok(())
     }
 }
