@@ -28,7 +28,7 @@ impl HaloContent {
 
     /// Where in an entry the orientation is.
     fn orientation_at(self) -> usize {
-        if self.velocities { 11 } else { 5 }
+        if self.velocities { PLACE + MOTION } else { PLACE }
     }
 
     /// Bytes per particle.
@@ -37,6 +37,11 @@ impl HaloContent {
         self.words() * size_of::<u64>()
     }
 }
+
+/// Words of an entry for position and image counters.
+const PLACE: usize = 4;
+/// Words of an entry for velocity and spin.
+const MOTION: usize = 6;
 
 /// What a ghost is when it appears.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -224,14 +229,16 @@ impl HaloPlan {
         );
         wrapped.clear();
         for (ghost, entry) in (self.owned..).zip(self.incoming.chunks_exact(words)) {
-            let image = unpack(entry, &mut particles.record[ghost], content.velocities);
+            let images = unpack(entry, &mut particles.record[ghost], content.velocities);
             if content.orientations {
                 let at = content.orientation_at();
                 particles.shape[ghost].orientation = [0, 1, 2, 3].map(|k| f64::from_bits(entry[at + k]));
             }
-            let old = std::mem::replace(&mut particles.image[ghost], image);
-            if image != old {
-                wrapped.push((ghost as u32, [0, 1, 2].map(|k| image[k] - old[k])));
+            let image = &mut particles.image[ghost];
+            if images != packed_images(*image) {
+                let change = change_of_images(images, packed_images(*image));
+                *image = [0, 1, 2].map(|k| image[k] + change[k]);
+                wrapped.push((ghost as u32, change));
             }
         }
         result
@@ -327,26 +334,47 @@ fn incoming<'a, T: Pod>(
     })
 }
 
+/// Bits of an image counter in an entry: the lowest ones, as only its change counts.
+const IMAGE_BITS: u32 = 21;
+
+/// The three image counters in one word.
+#[inline]
+fn packed_images(image: [i32; 3]) -> u64 {
+    let [x, y, z] = image.map(|count| u64::from(count as u32 & ((1 << IMAGE_BITS) - 1)));
+    x | y << IMAGE_BITS | z << (2 * IMAGE_BITS)
+}
+
+/// By how much each counter has changed, less than 2^20 either way.
+fn change_of_images(new: u64, old: u64) -> [i32; 3] {
+    [0, 1, 2].map(|k| {
+        let [new, old] = [new, old].map(|word| (word >> (k * IMAGE_BITS)) as u32);
+        (new.wrapping_sub(old) << (32 - IMAGE_BITS)).cast_signed() >> (32 - IMAGE_BITS)
+    })
+}
+
 /// One entry of an update but for the orientation.
+#[inline]
 fn pack(record: &Record, image: [i32; 3], velocities: bool, entry: &mut [u64]) {
-    entry[..3].copy_from_slice(&record.position.map(f64::to_bits));
-    entry[3] = u64::from(image[0] as u32) << 32 | u64::from(image[1] as u32);
-    entry[4] = u64::from(image[2] as u32);
+    let [x, y, z] = record.position.map(f64::to_bits);
+    entry[..PLACE].copy_from_slice(&[x, y, z, packed_images(image)]);
     if velocities {
-        entry[5..8].copy_from_slice(&record.velocity.map(f64::to_bits));
-        entry[8..11].copy_from_slice(&record.spin.map(f64::to_bits));
+        let [[u, v, w], [p, q, r]] = [record.velocity, record.spin].map(|vector| vector.map(f64::to_bits));
+        entry[PLACE..PLACE + MOTION].copy_from_slice(&[u, v, w, p, q, r]);
     }
 }
 
-/// The reverse of [`pack`]; returns the image counters.
-fn unpack(entry: &[u64], record: &mut Record, velocities: bool) -> [i32; 3] {
-    let vector = |start: usize| [0, 1, 2].map(|k| f64::from_bits(entry[start + k]));
-    record.position = vector(0);
+/// The reverse of [`pack`]; returns the packed image counters.
+#[inline]
+fn unpack(entry: &[u64], record: &mut Record, velocities: bool) -> u64 {
+    let vector = |words: &[u64]| [0, 1, 2].map(|k| f64::from_bits(words[k]));
+    let place: &[u64; PLACE] = entry[..PLACE].try_into().expect("an entry begins with its place");
+    record.position = vector(place);
     if velocities {
-        record.velocity = vector(5);
-        record.spin = vector(8);
+        let motion: &[u64; MOTION] = entry[PLACE..PLACE + MOTION].try_into().expect("then comes its motion");
+        record.velocity = vector(&motion[..3]);
+        record.spin = vector(&motion[3..]);
     }
-    [(entry[3] >> 32) as i32, entry[3] as i32, entry[4] as i32]
+    place[3]
 }
 
 #[cfg(test)]
@@ -365,9 +393,21 @@ mod tests {
             let mut entry = vec![0; HaloContent { velocities, orientations: false }.words()];
             pack(&record, [-1, 2, i32::MIN], velocities, &mut entry);
             let mut copy = Record::zeroed();
-            assert_eq!(unpack(&entry, &mut copy, velocities), [-1, 2, i32::MIN]);
+            assert_eq!(unpack(&entry, &mut copy, velocities), packed_images([-1, 2, i32::MIN]));
             assert_eq!(copy.position.map(f64::to_bits), record.position.map(f64::to_bits));
             assert_eq!(copy.velocity == record.velocity && copy.spin == record.spin, velocities);
+        }
+    }
+
+    #[test]
+    fn the_change_of_image_counters_comes_through_whatever_they_are() {
+        for count in [0, 1, -1, (1 << 20) - 1, 1 << 20, -(1 << 20), i32::MAX - 2, i32::MIN + 2] {
+            for change in [[0, 1, -1], [1, -1, 0], [-2, 0, 2]] {
+                let old = [count, -1, 1 << 21];
+                let new = [0, 1, 2].map(|k| old[k] + change[k]);
+                assert_eq!(change_of_images(packed_images(new), packed_images(old)), change, "from {old:?}");
+                assert_ne!(packed_images(new), packed_images(old));
+            }
         }
     }
 
