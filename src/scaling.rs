@@ -16,7 +16,7 @@ pub struct ScalingOptions {
     #[arg(long, value_delimiter = ',', default_values_t = [1, 1000, 10_000, 100_000])]
     ranks: Vec<usize>,
     /// Time of one rank alone per particle and step [s]: one over the particle-steps/s of `dem-mpi bench`.
-    #[arg(long, default_value_t = 2e-7)]
+    #[arg(long, default_value_t = 1e-7)]
     step_cost: f64,
     /// Share of that time spent on contacts.
     #[arg(long, default_value_t = 0.6)]
