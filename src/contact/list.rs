@@ -409,3 +409,57 @@ fn order_key(partner: u32, shift: [i32; 3]) -> u64 {
     let [x, y, z] = shift.map(|s| (s + 128) as u64);
     u64::from(partner) << 24 | x << 16 | y << 8 | z
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Near contacts over one and seventy places, contacts across strips and with ghosts, 300 owned particles in two strips.
+    fn list(particles: &Particles) -> ContactList {
+        let here = shift::encode([0; 3]);
+        let mut list = ContactList::default();
+        list.cut(vec![0..200, 200..300], 0, &[1]);
+        let mut fill = |strip: usize, kind: usize, pairs: &[(usize, usize)]| {
+            let section = &mut list.sections[strip * PARTNERS.len() + kind];
+            section.resize(pairs.len());
+            for (place, (a, b)) in pairs.iter().enumerate() {
+                let (low, high) = if particles.id[*a] < particles.id[*b] { (*a, *b) } else { (*b, *a) };
+                section.set(place, (low - section.origin) as u32, (high - section.origin) as u32, here);
+            }
+        };
+        for (strip, range) in [0..200, 200..300].into_iter().enumerate() {
+            let near: Vec<_> = range.clone().flat_map(|p| [(p, p + 1), (p, p + 70)]).collect();
+            fill(strip, 0, &near.into_iter().filter(|(_, b)| *b < range.end).collect::<Vec<_>>());
+        }
+        fill(0, 1, &(0..200).step_by(3).map(|p| (p, 200 + p / 2)).collect::<Vec<_>>());
+        fill(1, 3, &(250..300).map(|p| (p, 300 + p % 7)).collect::<Vec<_>>());
+        list.index(particles, 310);
+        list
+    }
+
+    #[test]
+    fn the_lines_of_a_particle_are_those_of_its_contacts_in_order_of_the_partners_ids() {
+        let mut particles = Particles { owned: 300, ..Particles::default() };
+        // Ids in another order than the particles.
+        particles.id.extend((0..307).map(|p| p * 101 % 307));
+        particles.record.resize(307, bytemuck::Zeroable::zeroed());
+        let list = list(&particles);
+        let mut expected = vec![Vec::new(); particles.id.len()];
+        for run in &list.runs {
+            let section = &list.sections[run.section as usize];
+            let places = run.block as usize * BLOCK..((run.block + run.blocks) as usize * BLOCK).min(section.count);
+            for (line, place) in (run.line as usize..).zip(places) {
+                let (first, second) = (section.first_of(place), section.second_of(place));
+                assert_eq!(list.locate(line), (run.section as usize, place));
+                expected[first].push((particles.id[second], line, false));
+                expected[second].push((particles.id[first], line, true));
+            }
+        }
+        assert!(expected.iter().any(|lines| lines.len() > 4) && list.strips[0].ring < list.lines);
+        for (particle, lines) in expected.iter_mut().enumerate() {
+            lines.sort_unstable();
+            let lines: Vec<_> = lines.iter().map(|(_, line, is_second)| (*line, *is_second)).collect();
+            assert_eq!(list.lines_of(particle).collect::<Vec<_>>(), lines, "particle {particle}");
+        }
+    }
+}
