@@ -60,7 +60,8 @@ impl<'a> ChunkEnds<'a> {
     pub fn in_order(self) -> impl Iterator<Item = (usize, &'a [End])> {
         self.summing.iter().map(move |place| {
             let place = usize::from(*place);
-            // SAFETY: `ContactList::index` makes what the fields promise, and nobody else can change it.
+            // SAFETY: `ContactList::index` makes what the fields promise; the arrays are private to this module's parent,
+            // and strips are not changed between two calls of it.
             let ends = unsafe {
                 let (from, to) = (self.offsets.get_unchecked(place), self.offsets.get_unchecked(place + 1));
                 self.ends.get_unchecked(*from as usize..*to as usize)

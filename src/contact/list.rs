@@ -5,7 +5,8 @@
 //! contact belongs to the strip of its owner, the particle with the lower local index. Within a strip the
 //! step goes chunk by chunk: contacts owned by the chunk's particles, then sum and motion of these
 //! particles, whose contacts are then complete. So the output lines of contacts within the strip are
-//! needed for a short while only and live in a ring buffer; those of all other contacts are kept for the step.
+//! needed for a short while only and live in a ring buffer; those of all other contacts are kept for the step, and
+//! copied behind the ring for the chunk whose sums read them, which so find every line in one buffer.
 
 use super::ends::{End, Reading};
 use super::section::{BLOCK, PARTNERS, Partners, Section};
@@ -148,23 +149,27 @@ impl ContactList {
 
     /// The output lines of a local particle's contacts, in the order of summation, and whether it is their second.
     pub fn lines_of(&self, particle: usize) -> impl Iterator<Item = (usize, bool)> {
-        let ends = &self.ends[self.offsets[particle] as usize..self.offsets[particle + 1] as usize];
+        self.places_of(particle).map(move |place| self.line_at(particle, place))
+    }
+
+    /// Where the ends of a local particle are.
+    fn places_of(&self, particle: usize) -> Range<usize> {
+        self.offsets[particle] as usize..self.offsets[particle + 1] as usize
+    }
+
+    /// Output line of one of a particle's ends, and whether the particle is its second.
+    fn line_at(&self, particle: usize, place: usize) -> (usize, bool) {
+        let (end, number) = (self.ends[place], self.ends[place].number());
         let strip = self.strips.partition_point(|strip| strip.particles.end <= particle);
-        let strip = self.strips.get(strip).map(|strip| (strip, (particle - strip.particles.start) / CHUNK));
-        ends.iter().map(move |end| {
-            let number = end.number();
-            let line = match strip {
-                None => number,
-                Some((strip, chunk)) if number >= strip.ring => {
-                    strip.kept_reads_of(chunk)[number - strip.ring] as usize
-                }
-                Some((strip, chunk)) => {
-                    let last = self.reached(strip, chunk) - 1;
-                    last - ((last - number) & (strip.ring - 1))
-                }
-            };
-            (line, end.is_second())
-        })
+        let line = self.strips.get(strip).map_or(number, |strip| {
+            let chunk = (particle - strip.particles.start) / CHUNK;
+            if number >= strip.ring {
+                return strip.kept_reads_of(chunk)[number - strip.ring] as usize;
+            }
+            let last = self.reached(strip, chunk) - 1;
+            last - ((last - number) & (strip.ring - 1))
+        });
+        (line, end.is_second())
     }
 
     /// Number of the first line after those of a strip's chunk.
@@ -189,8 +194,8 @@ impl ContactList {
     /// A particle was wrapped by `wraps` images (+1: it left through the high face): adjust the shifts
     /// of its contacts so that every pair vector stays what it was.
     pub fn apply_wrap(&mut self, particle: usize, wraps: [i32; 3]) {
-        let lines: Vec<_> = self.lines_of(particle).collect();
-        for (line, is_second) in lines {
+        for place in self.places_of(particle) {
+            let (line, is_second) = self.line_at(particle, place);
             let (section, place) = self.locate(line);
             let section = &mut self.sections[section];
             if section.partners == Partners::Wall {
