@@ -3,7 +3,7 @@
 
 use super::lane::Lane;
 use super::law::{
-    Column, ContactLaw, ContactResponse, Energies, LawVisitor, NormalLaw, NormalResponse, RollingLaw, TangentialLaw,
+    Column, ContactLaw, ContactResponse, Energies, LawVisitor, MAX_EARLY, NormalLaw, NormalResponse, RollingLaw, TangentialLaw,
     Touch, VectorResponse,
 };
 use super::registry::{build_normal, build_rolling, build_tangential};
@@ -31,7 +31,7 @@ pub struct NoTangential;
 pub struct NoRolling;
 
 macro_rules! without_resistance {
-    ($law:ident, $role:ident) => {
+    ($law:ident, $role:ident, $evaluate:ident $(, $early:ty)?) => {
         impl $role for $law {
             const MEMORY: usize = 0;
             fn columns(&self) -> Vec<Column> {
@@ -39,14 +39,20 @@ macro_rules! without_resistance {
             }
             fn prepare(&mut self, _time_step: f64) {}
             #[inline(always)]
-            fn evaluate<L: Lane>(&self, _: &Touch<L>, _: &NormalResponse<L>, _: &mut [L]) -> VectorResponse<L> {
+            fn $evaluate<L: Lane>(
+                &self,
+                _: &Touch<L>,
+                _: &NormalResponse<L>,
+                $(_: $early,)?
+                _: &mut [L],
+            ) -> VectorResponse<L> {
                 VectorResponse { value: [L::splat(0.0); 3], energies: Energies::zero() }
             }
         }
     };
 }
-without_resistance!(NoTangential, TangentialLaw);
-without_resistance!(NoRolling, RollingLaw);
+without_resistance!(NoTangential, TangentialLaw, complete, &[L]);
+without_resistance!(NoRolling, RollingLaw, evaluate);
 
 impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N, T, R> {
     const MEMORY: usize = {
@@ -58,6 +64,10 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     const TANGENTIAL: bool = T::MEMORY > 0;
     const ROLLING: bool = R::MEMORY > 0;
     const LASTS: bool = N::LASTS;
+    const EARLY: usize = {
+        assert!(T::EARLY <= MAX_EARLY, "a tangential law hands on more numbers than the pass holds");
+        T::EARLY
+    };
 
     fn range(&self) -> f64 {
         self.normal.range()
@@ -84,9 +94,20 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
     }
 
     #[inline(always)]
-    fn complete<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> ContactResponse<L> {
+    fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]) {
+        self.tangential.early(touch, normal, &memory[..T::MEMORY], early);
+    }
+
+    #[inline(always)]
+    fn complete<L: Lane>(
+        &self,
+        touch: &Touch<L>,
+        normal: &NormalResponse<L>,
+        early: &[L],
+        memory: &mut [L],
+    ) -> ContactResponse<L> {
         let (tangential_memory, rolling_memory) = memory.split_at_mut(T::MEMORY);
-        let mut tangential = self.tangential.evaluate(touch, normal, tangential_memory);
+        let mut tangential = self.tangential.complete(touch, normal, early, tangential_memory);
         let mut rolling = self.rolling.evaluate(touch, normal, rolling_memory);
         // Written so that NaN counts as joined and is found.
         let joined = !L::splat(0.0).at_least(normal.contact_radius);

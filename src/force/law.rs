@@ -10,6 +10,9 @@
 
 use super::lane::{Lane, Vector};
 
+/// Most numbers that a law may hand on, see [`TangentialLaw::early`].
+pub const MAX_EARLY: usize = 9;
+
 /// Geometry and relative motion of one touch, at the full step.
 #[derive(Debug, Clone, Copy)]
 pub struct Touch<L> {
@@ -164,8 +167,26 @@ pub trait TangentialLaw: Copy + Send + Sync + 'static {
     fn prepare(&mut self, time_step: f64);
     /// The relaxed limit, see [`NormalLaw::relax`].
     fn relax(&mut self) {}
-    /// Force of one touch.
-    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
+    /// Numbers that [`Self::early`] hands on.
+    const EARLY: usize = 0;
+    /// The first part of the evaluation, which the pass runs over several blocks before the rest, if the law has any: a
+    /// long chain of operations is then under way for several contacts at a time. Fills the `EARLY` numbers.
+    fn early<L: Lane>(&self, _touch: &Touch<L>, _normal: &NormalResponse<L>, _memory: &[L], _early: &mut [L]) {}
+    /// Force of one touch; `early` are the numbers of [`Self::early`].
+    fn complete<L: Lane>(
+        &self,
+        touch: &Touch<L>,
+        normal: &NormalResponse<L>,
+        early: &[L],
+        memory: &mut [L],
+    ) -> VectorResponse<L>;
+    /// Both parts.
+    #[inline(always)]
+    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
+        let mut early = [L::splat(0.0); MAX_EARLY];
+        self.early(touch, normal, memory, &mut early[..Self::EARLY]);
+        self.complete(touch, normal, &early[..Self::EARLY], memory)
+    }
 }
 
 /// A rolling and twisting resistance law.
@@ -210,6 +231,8 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     const ROLLING: bool;
     /// See [`NormalLaw::LASTS`].
     const LASTS: bool;
+    /// See [`TangentialLaw::EARLY`].
+    const EARLY: usize;
     /// See [`NormalLaw::range`].
     fn range(&self) -> f64;
     /// Names and units of the memory columns.
@@ -220,14 +243,24 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     fn relax(&mut self) {}
     /// The normal law's part; `memory` has `NORMAL_MEMORY` entries.
     fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
+    /// See [`TangentialLaw::early`]; `memory` has the remaining entries.
+    fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]);
     /// The other laws' part and the whole response; `memory` has the remaining entries.
-    fn complete<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> ContactResponse<L>;
-    /// Both parts of one touch; `memory` has `MEMORY` entries.
+    fn complete<L: Lane>(
+        &self,
+        touch: &Touch<L>,
+        normal: &NormalResponse<L>,
+        early: &[L],
+        memory: &mut [L],
+    ) -> ContactResponse<L>;
+    /// All parts of one touch; `memory` has `MEMORY` entries.
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L> {
         let (own, rest) = memory.split_at_mut(Self::NORMAL_MEMORY);
         let normal = self.normal(touch, own);
-        self.complete(touch, &normal, rest)
+        let mut early = [L::splat(0.0); MAX_EARLY];
+        self.early(touch, &normal, rest, &mut early[..Self::EARLY]);
+        self.complete(touch, &normal, &early[..Self::EARLY], rest)
     }
 }
 

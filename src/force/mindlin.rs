@@ -139,8 +139,26 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         }
     }
 
+    const EARLY: usize = SPRINGS;
+
+    /// The shares that bring the turned springs to their lengths.
     #[inline(always)]
-    fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
+    fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]) {
+        let turning = Turning::new(touch, self.time_step);
+        for (k, share) in early.iter_mut().enumerate() {
+            let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
+            *share = turning.share(stored, normal.contact_radius, memory[3 * SPRINGS]);
+        }
+    }
+
+    #[inline(always)]
+    fn complete<L: Lane>(
+        &self,
+        touch: &Touch<L>,
+        normal: &NormalResponse<L>,
+        early: &[L],
+        memory: &mut [L],
+    ) -> VectorResponse<L> {
         let (zero, half, one) = (L::splat(0.0), L::splat(0.5), L::splat(1.0));
         let turning = Turning::new(touch, self.time_step);
         let radius = normal.contact_radius;
@@ -152,7 +170,7 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         let mut carried = [[zero; 3]; SPRINGS];
         for k in 0..SPRINGS {
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            carried[k] = turning.apply(stored, radius, last);
+            carried[k] = scale(turning.turn(stored), early[k]);
             advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * radius);
             trial[k] = add(carried[k], advance[k]);
         }

@@ -19,7 +19,23 @@ impl<L: Lane> Turning<L> {
         Self { normal: touch.normal, angle: touch.spin_about_normal * L::splat(time_step) }
     }
 
-    /// The vector after the step. The angle φ about n is taken as arctan φ (third order in Δt).
+    /// The vector after the step: [`Self::turn`] times [`Self::share`].
+    #[inline(always)]
+    #[must_use]
+    pub fn apply(&self, stored: Vector<L>, stiffness: L, last: L) -> Vector<L> {
+        scale(self.turn(stored), self.share(stored, stiffness, last))
+    }
+
+    /// The vector projected on the new tangent plane and turned, not yet of the right length. The angle φ about n is
+    /// taken as arctan φ (third order in Δt).
+    #[inline(always)]
+    #[must_use]
+    pub fn turn(&self, stored: Vector<L>) -> Vector<L> {
+        let along = dot(stored, self.normal);
+        add(sub(stored, scale(self.normal, along)), scale(cross(self.normal, stored), self.angle))
+    }
+
+    /// What brings the turned vector to the length that it has after the step.
     ///
     /// It shrinks with the stiffness: a spring keeps `min(1, stiffness/last stiffness)` of its force, so that
     /// unloading creates no energy. A vector without a last stiffness (first touch) is zero.
@@ -30,10 +46,9 @@ impl<L: Lane> Turning<L> {
     /// so that a vector that turns too fast shrinks.
     #[inline(always)]
     #[must_use]
-    pub fn apply(&self, stored: Vector<L>, stiffness: L, last: L) -> Vector<L> {
+    pub fn share(&self, stored: Vector<L>, stiffness: L, last: L) -> L {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let along = dot(stored, self.normal);
-        let turned = add(sub(stored, scale(self.normal, along)), scale(cross(self.normal, stored), self.angle));
         let square = dot(stored, stored);
         // One division for two, by |stored|² and by the last stiffness.
         let both = square * last;
@@ -42,7 +57,7 @@ impl<L: Lane> Turning<L> {
         let lost = (tilt + self.angle * self.angle * (tilt - one)).max(-one);
         let stretch = one + lost * (L::splat(0.5) + lost * (L::splat(0.375) + lost * L::splat(0.3125)));
         let kept = (stiffness * (square * inverse)).min(one);
-        scale(turned, L::select(both.greater(zero), stretch * kept, zero))
+        L::select(both.greater(zero), stretch * kept, zero)
     }
 }
 

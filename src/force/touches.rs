@@ -4,7 +4,7 @@
 
 use super::geometry::{PairTouch, Relative};
 use super::lane::{Lane, Vector};
-use super::law::{Energies, NormalResponse, Touch};
+use super::law::{Energies, MAX_EARLY, NormalResponse, Touch};
 use crate::contact::section::{BLOCK, CacheLine};
 
 /// Blocks in a batch: few, so that they stay in the nearest cache.
@@ -55,6 +55,8 @@ pub struct BlockTouches {
     relative: Numbers<12>,
     touch: Numbers<13>,
     normal: Numbers<3>,
+    /// What the tangential law hands on.
+    early: Numbers<MAX_EARLY>,
     /// Relative spin, if there is rolling or radii are unequal.
     relative_spin: Numbers<3>,
     /// Imposed velocity, if faces move or there is a ledger.
@@ -69,6 +71,7 @@ impl BlockTouches {
         relative: Numbers::ZERO,
         touch: Numbers::ZERO,
         normal: Numbers::ZERO,
+        early: Numbers::ZERO,
         relative_spin: Numbers::ZERO,
         imposed_velocity: Numbers::ZERO,
         energies: Numbers::ZERO,
@@ -160,6 +163,20 @@ impl BlockTouches {
         if ledger {
             let e = &normal.energies;
             self.energies.put(0, lane, &[e.damping, e.viscous, e.friction, e.plastic]);
+        }
+    }
+
+    /// Take in what the tangential law hands on.
+    #[inline(always)]
+    pub fn put_early<L: Lane>(&mut self, lane: usize, early: &[L]) {
+        self.early.put(0, lane, early);
+    }
+
+    /// What the tangential law hands on, as many numbers as there is room for.
+    #[inline(always)]
+    pub fn early<L: Lane>(&self, lane: usize, early: &mut [L]) {
+        for (number, value) in early.iter_mut().enumerate() {
+            *value = self.early.one(number, lane);
         }
     }
 

@@ -84,6 +84,35 @@ unsafe fn sum<L: Lane, const WIDTH: usize, const STRIDE: usize>(
     signs: &[f64; 5],
     numbers: &[f64],
 ) -> [f64; 8] {
+    // SAFETY: as the function's.
+    let few = |ends: &[End]| unsafe { sum_few::<L, WIDTH, STRIDE>(ends, signs, numbers) };
+    // The numbers are written out, so that the loop over the few ends of most particles is.
+    let [force, torque] = match ends.len() {
+        3 => few(&ends[..3]),
+        4 => few(&ends[..4]),
+        5 => few(&ends[..5]),
+        6 => few(&ends[..6]),
+        7 => few(&ends[..7]),
+        8 => few(&ends[..8]),
+        9 => few(&ends[..9]),
+        _ => few(ends),
+    };
+    let mut load = [0.0; 8];
+    force.store(&mut load[..4]);
+    torque.store(&mut load[4..]);
+    load
+}
+
+/// See [`sum`].
+///
+/// # Safety
+/// As [`sum`].
+#[inline(always)]
+unsafe fn sum_few<L: Lane, const WIDTH: usize, const STRIDE: usize>(
+    ends: &[End],
+    signs: &[f64; 5],
+    numbers: &[f64],
+) -> [L; 2] {
     const { assert!(WIDTH <= STRIDE) };
     let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
     for end in ends {
@@ -98,8 +127,5 @@ unsafe fn sum<L: Lane, const WIDTH: usize, const STRIDE: usize>(
             torque = torque + four(4 + end.side());
         }
     }
-    let mut load = [0.0; 8];
-    force.store(&mut load[..4]);
-    torque.store(&mut load[4..]);
-    load
+    [force, torque]
 }

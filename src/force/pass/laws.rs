@@ -7,7 +7,7 @@ use crate::force::geometry::PairTouch;
 use crate::force::lane::{Lane, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
-use crate::force::law::{ContactLaw, ContactResponse};
+use crate::force::law::{ContactLaw, ContactResponse, MAX_EARLY};
 use crate::force::touches::{BlockTouches, LawTouch};
 use std::ops::Range;
 
@@ -58,6 +58,13 @@ impl<C: ContactLaw> Laws<'_, C> {
                     self.law.normal(&pair.touch, memory)
                 });
                 touches.put_normal(lane, &normal, LEDGER);
+                if C::EARLY > 0 {
+                    let (mut values, mut early) = ([L::splat(0.0); MAX_MEMORY], [L::splat(0.0); MAX_EARLY]);
+                    let rest = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
+                    load(rest, &memory[of(block)][C::NORMAL_MEMORY..], lane);
+                    self.law.early(&pair.touch, &normal, rest, &mut early[..C::EARLY]);
+                    touches.put_early(lane, &early[..C::EARLY]);
+                }
             }
         }
         for (block, touches) in touches.iter().enumerate() {
@@ -66,9 +73,11 @@ impl<C: ContactLaw> Laws<'_, C> {
             for lane in lanes() {
                 let rows = &mut rows[lane * self.stride..];
                 let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
+                let mut early = [L::splat(0.0); MAX_EARLY];
+                touches.early(lane, &mut early[..C::EARLY]);
                 let rest = C::NORMAL_MEMORY..C::MEMORY;
                 let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
-                    self.law.complete(&pair.touch, &normal, memory)
+                    self.law.complete(&pair.touch, &normal, &early[..C::EARLY], memory)
                 });
                 self.write::<L, LEDGER>(&pair, &response, rows, false);
             }
@@ -130,6 +139,14 @@ impl<C: ContactLaw> Laws<'_, C> {
     }
 }
 
+/// Some memory columns of the lanes from `lane` on.
+#[inline(always)]
+fn load<L: Lane>(values: &mut [L], memory: &[CacheLine], lane: usize) {
+    for (value, column) in values.iter_mut().zip(memory) {
+        *value = L::load(&column.0[lane..]);
+    }
+}
+
 /// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
 #[inline(always)]
 fn with_memory<L: Lane, T>(
@@ -143,9 +160,7 @@ fn with_memory<L: Lane, T>(
     let mut values = [zero; MAX_MEMORY];
     let memory = &mut memory[columns];
     let values = &mut values[..memory.len()];
-    for (value, column) in values.iter_mut().zip(&*memory) {
-        *value = L::load(&column.0[lane..]);
-    }
+    load(values, memory, lane);
     let response = law(values);
     for (value, column) in values.iter().zip(memory) {
         L::select(alive, *value, zero).store(&mut column.0[lane..]);
