@@ -3,8 +3,8 @@
 
 use super::lane::Lane;
 use super::law::{
-    Column, ContactLaw, ContactResponse, Energies, LawVisitor, MAX_EARLY, NormalLaw, NormalResponse, RollingLaw, TangentialLaw,
-    Touch, VectorResponse,
+    Column, ContactLaw, ContactResponse, Energies, LawVisitor, MAX_EARLY, NormalLaw, NormalResponse, RollingLaw,
+    TangentialLaw, Touch, VectorResponse,
 };
 use super::registry::{build_normal, build_rolling, build_tangential};
 use super::shear::ShearSprings;
@@ -110,7 +110,7 @@ impl<N: NormalLaw, T: TangentialLaw, R: RollingLaw> ContactLaw for Composition<N
         let mut tangential = self.tangential.complete(touch, normal, early, tangential_memory);
         let mut rolling = self.rolling.evaluate(touch, normal, rolling_memory);
         // Written so that NaN counts as joined and is found.
-        let joined = !L::splat(0.0).at_least(normal.contact_radius);
+        let joined = L::splat(0.0).not_at_least(normal.contact_radius);
         if N::LASTS {
             // Friction ends with the contact circle, though the normal law's memory goes on.
             tangential = tangential.only(joined);

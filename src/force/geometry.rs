@@ -100,15 +100,16 @@ impl<L: Lane> PairTouch<L> {
 
 impl<L: Lane> Relative<L> {
     /// Some pairs of spheres at these offsets, in no image yet and without what the cell imposes; without
-    /// `relative_spin`, which between equal spheres only rolling laws need.
+    /// `relative_spin`, which between equal spheres only rolling laws need. `EQUAL`: all radii are, and those of the
+    /// pair mean nothing, see [`Self::equal`].
     ///
     /// # Source
     /// PHYSICS.md section 1.
     #[inline(always)]
     #[must_use]
-    pub fn of(records: &[Record], pairs: [&[u32]; 2]) -> Self {
-        let [[x, y, z, radius_difference], [vx, vy, vz, inverse_masses], [wx, wy, wz, radius_sum]] =
-            L::relative(records, pairs);
+    pub fn of<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> Self {
+        let [[x, y, z, radius_difference], [vx, vy, vz, radius_sum], [wx, wy, wz, inverse_masses]] =
+            L::relative::<EQUAL>(records, pairs);
         Self {
             branch: [x, y, z],
             velocity: [vx, vy, vz],
@@ -119,6 +120,13 @@ impl<L: Lane> Relative<L> {
             radius_sum,
             inverse_masses,
         }
+    }
+
+    /// Both of this radius.
+    #[inline(always)]
+    pub fn equal(&mut self, radius: f64) {
+        self.radius_difference = L::splat(0.0);
+        self.radius_sum = L::splat(radius + radius);
     }
 
     /// Bring the second ones into the images of their packed shifts. Where all are 0 this changes nothing (no component
@@ -185,7 +193,7 @@ pub fn touch<L: Lane>(pair: &Relative<L>, mixed: bool) -> PairTouch<L> {
         spin_about_normal: dot(mean_spin, normal),
     };
     PairTouch {
-        touching: !(L::splat(TOUCH_TOLERANCE) * sum).at_least(overlap),
+        touching: (L::splat(TOUCH_TOLERANCE) * sum).not_at_least(overlap),
         touch,
         branch,
         imposed_velocity: pair.imposed_velocity,
@@ -200,7 +208,7 @@ pub fn touch<L: Lane>(pair: &Relative<L>, mixed: bool) -> PairTouch<L> {
 #[inline(always)]
 #[must_use]
 pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
-    let mut pair = Relative::of(records, pairs);
+    let mut pair = Relative::of::<false>(records, pairs);
     // Away from periodic faces there is nothing to look up.
     if motion.faces_move || !shift::all_here(&codes[..L::WIDTH]) {
         pair.enter_images(codes, motion);
@@ -248,7 +256,7 @@ pub fn wall(a: &Record, wall: u32, motion: &CellMotion) -> PairTouch<f64> {
         spin_about_normal: 0.5 * dot(a.spin, unit),
     };
     PairTouch {
-        touching: !(TOUCH_TOLERANCE * a.radius).at_least(overlap),
+        touching: (TOUCH_TOLERANCE * a.radius).not_at_least(overlap),
         touch,
         branch,
         imposed_velocity: imposed,

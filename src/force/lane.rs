@@ -60,6 +60,11 @@ pub trait Lane:
     fn greater(self, other: Self) -> Self::Mask;
     /// `self >= other`.
     fn at_least(self, other: Self) -> Self::Mask;
+    /// `!(self >= other)`: less or not a number.
+    #[inline(always)]
+    fn not_at_least(self, other: Self) -> Self::Mask {
+        !self.at_least(other)
+    }
     /// Lane by lane: `if mask { yes } else { no }` (a blend, never a product).
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// True in some lane.
@@ -70,8 +75,9 @@ pub trait Lane:
     /// transposed: entry `c` holds number `c` of each record.
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD];
     /// What `WIDTH` pairs need of their records, transposed: position and radius, second minus first; velocity,
-    /// second minus first, and 1/m, both together; spin and radius, both together.
-    fn relative(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3];
+    /// second minus first, and radius, both together; spin and 1/m, both together. `EQUAL`: all radii are, and what
+    /// stands in the place of radii means nothing.
+    fn relative<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3];
     /// Spin of the second less that of the first.
     fn relative_spin(records: &[Record], pairs: [&[u32]; 2]) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
@@ -123,6 +129,34 @@ pub fn prefetch<T>(values: &[T], index: usize, count: usize) {
         avx2::prefetch_at(values.as_ptr().wrapping_add(index).addr() + offset);
     }
 }
+
+/// Run a block of code for every group of lanes of a block of eight, `lane` being the place of the group's first; written
+/// out, as the compiler leaves loops over two long ones alone. (A function that takes a closure would not always be
+/// compiled for the vector instructions of its caller.)
+macro_rules! for_each_group {
+    ($lanes:ident, $lane:ident, $body:block) => {
+        match $lanes::WIDTH {
+            8 => {
+                let $lane = 0;
+                $body
+            }
+            4 => {
+                {
+                    let $lane = 0;
+                    $body
+                }
+                let $lane = 4;
+                $body
+            }
+            width => {
+                for $lane in (0..8).step_by(width) {
+                    $body
+                }
+            }
+        }
+    };
+}
+pub(crate) use for_each_group;
 
 /// Whether these values have outgrown the nearest caches, so that asking ahead pays.
 #[inline(always)]
@@ -193,14 +227,14 @@ impl Lane for f64 {
         bytemuck::cast(*record_at(records, offsets[0]))
     }
     #[inline(always)]
-    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
         let [a, b] = [first[0], second[0]].map(|offset| record_at(records, offset));
         let ([x, y, z], [vx, vy, vz]) = (sub(b.position, a.position), sub(b.velocity, a.velocity));
         let [wx, wy, wz] = add(b.spin, a.spin);
         [
             [x, y, z, b.radius - a.radius],
-            [vx, vy, vz, b.inverse_mass + a.inverse_mass],
-            [wx, wy, wz, b.radius_again + a.radius_again],
+            [vx, vy, vz, b.radius_again + a.radius_again],
+            [wx, wy, wz, b.inverse_mass + a.inverse_mass],
         ]
     }
     #[inline(always)]

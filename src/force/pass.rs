@@ -213,6 +213,11 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
         let records = bodies.records;
         let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
         let far = is_far(records);
+        let equal = self.bodies == Bodies::EqualSpheres;
+        if equal && let Some(record) = records.first() {
+            touches.iter_mut().for_each(|touches| touches.put_radius(record.radius));
+        }
+        let geometry = if equal { spheres::geometry::<true> } else { spheres::geometry::<false> };
         let mut excess = None;
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);
@@ -223,9 +228,9 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
                 prefetch(&section.second, ahead * BLOCK, BATCH * BLOCK);
                 prefetch(&section.shift, ahead * BLOCK, BATCH * BLOCK);
             }
-            let found = spheres::geometry(input, records, section, blocks.clone(), content, touches);
+            let found = geometry(input, records, section, blocks.clone(), content, touches);
             excess = excess.or(found);
-            let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
+            let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step, equal };
             let memory = &mut section.memory[blocks.start * C::MEMORY..blocks.end * C::MEMORY];
             let touches = &mut touches[..blocks.len()];
             match (input.simd, input.ledger) {
@@ -293,7 +298,7 @@ impl<C: ContactLaw> LawPass<C> {
     fn walls(&self, job: Job) -> Excess {
         let Job { input, bodies, section, blocks, lines, .. } = job;
         let records = bodies.records;
-        let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step };
+        let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step, equal: false };
         let mut excess = None;
         for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
             let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;

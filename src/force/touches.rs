@@ -53,7 +53,8 @@ impl<const N: usize> Numbers<N> {
 #[derive(Debug, Clone, Copy)]
 pub struct BlockTouches {
     relative: Numbers<12>,
-    touch: Numbers<13>,
+    touch: Numbers<11>,
+    arms: Numbers<2>,
     normal: Numbers<3>,
     /// What the tangential law hands on.
     early: Numbers<MAX_EARLY>,
@@ -70,6 +71,7 @@ impl BlockTouches {
     pub const ZERO: Self = Self {
         relative: Numbers::ZERO,
         touch: Numbers::ZERO,
+        arms: Numbers::ZERO,
         normal: Numbers::ZERO,
         early: Numbers::ZERO,
         relative_spin: Numbers::ZERO,
@@ -77,13 +79,22 @@ impl BlockTouches {
         energies: Numbers::ZERO,
     };
 
-    /// Take in the bodies of the lanes from `lane` on, without what the cell imposes.
+    /// Take in the bodies of the lanes from `lane` on, without what the cell imposes. `EQUAL`: without the radii.
     #[inline(always)]
-    pub fn put_relative<L: Lane>(&mut self, lane: usize, pair: &Relative<L>) {
+    pub fn put_relative<L: Lane, const EQUAL: bool>(&mut self, lane: usize, pair: &Relative<L>) {
         self.relative.put(0, lane, &pair.branch);
         self.relative.put(3, lane, &pair.velocity);
         self.relative.put(6, lane, &pair.spin_sum);
-        self.relative.put(9, lane, &[pair.radius_difference, pair.radius_sum, pair.inverse_masses]);
+        self.relative.put(9, lane, &[pair.inverse_masses]);
+        if !EQUAL {
+            self.relative.put(10, lane, &[pair.radius_sum, pair.radius_difference]);
+        }
+    }
+
+    /// Take in what `EQUAL` leaves out: all spheres have this radius.
+    pub fn put_radius(&mut self, radius: f64) {
+        self.relative.0[10].0 = [radius + radius; BLOCK];
+        self.touch.0[10].0 = [0.25 * (radius + radius); BLOCK];
     }
 
     /// Take in the branch vectors of the lanes from `lane` on again, and the imposed velocity.
@@ -107,23 +118,28 @@ impl BlockTouches {
             branch: self.relative.vector(0, lane),
             velocity: self.relative.vector(3, lane),
             spin_sum: self.relative.vector(6, lane),
-            radius_difference: self.relative.one(9, lane),
+            inverse_masses: self.relative.one(9, lane),
             radius_sum: self.relative.one(10, lane),
-            inverse_masses: self.relative.one(11, lane),
+            radius_difference: self.relative.one(11, lane),
             relative_spin: self.relative_spin.vector(0, lane),
             imposed_velocity: self.imposed_velocity.vector(0, lane),
         }
     }
 
-    /// Take in the touches of the lanes from `lane` on.
+    /// Take in the touches of the lanes from `lane` on. `EQUAL`: without the effective radius and the second arm,
+    /// which is the first.
     #[inline(always)]
-    pub fn put_touch<L: Lane>(&mut self, lane: usize, pair: &PairTouch<L>, content: Content) {
+    pub fn put_touch<L: Lane, const EQUAL: bool>(&mut self, lane: usize, pair: &PairTouch<L>, content: Content) {
         let touch = &pair.touch;
         let overlap = L::select(pair.alive(content.range), touch.overlap, L::splat(DEAD));
-        self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_radius, touch.effective_mass]);
+        self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_mass, touch.spin_about_normal]);
         self.touch.put(4, lane, &touch.normal);
         self.touch.put(7, lane, &touch.slip_velocity);
-        self.touch.put(10, lane, &[touch.spin_about_normal, pair.arm_first, pair.arm_second]);
+        self.arms.put(0, lane, &[pair.arm_first]);
+        if !EQUAL {
+            self.touch.put(10, lane, &[touch.effective_radius]);
+            self.arms.put(1, lane, &[pair.arm_second]);
+        }
         if content.ledger {
             self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
         }
@@ -136,22 +152,22 @@ impl BlockTouches {
         let overlap = self.touch.one(0, lane);
         LawTouch {
             // NaN is alive.
-            alive: !L::splat(DEAD).at_least(overlap),
+            alive: L::splat(DEAD).not_at_least(overlap),
             touch: Touch {
                 overlap,
                 overlap_rate: self.touch.one(1, lane),
-                effective_radius: self.touch.one(2, lane),
+                effective_radius: self.touch.one(10, lane),
                 radius_factor: L::splat(1.0),
                 overlap_factor: L::splat(1.0),
                 size: self.relative.one(10, lane),
-                effective_mass: self.touch.one(3, lane),
+                effective_mass: self.touch.one(2, lane),
                 normal: self.touch.vector(4, lane),
                 slip_velocity: self.touch.vector(7, lane),
-                spin_about_normal: self.touch.one(10, lane),
+                spin_about_normal: self.touch.one(3, lane),
                 relative_spin: self.relative_spin.vector(0, lane),
             },
-            arm_first: self.touch.one(11, lane),
-            arm_second: self.touch.one(12, lane),
+            arm_first: self.arms.one(0, lane),
+            arm_second: self.arms.one(1, lane),
             imposed_velocity: self.imposed_velocity.vector(0, lane),
         }
     }

@@ -225,7 +225,7 @@ fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
 }
 
 /// Sums first, then the motion, a particle at a time in lanes (x, y, z, not used). A position shares its lanes
-/// with the radius, velocity and spin with 1/m and 1/I; constants that are 0 or 1 in the fourth lane leave them.
+/// and the velocity with the radius, the spin with 1/m; constants that are 0 or 1 in the fourth lane leave them.
 /// Ellipsoids turn before, in the lanes `W` side by side.
 #[inline(always)]
 fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
@@ -277,7 +277,7 @@ fn move_all<L: Lane, const TURN: bool>(
         prefetch(std::slice::from_ref(reference), AHEAD, 1);
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
-        let inverse_mass = L::splat(numbers[7]);
+        let inverse_mass = L::splat(numbers[11]);
         let pull = L::select(inverse_mass.greater(zero), gravity, zero);
         let acceleration = force * inverse_mass + pull;
         let mut half_velocity = L::load(velocity) + kick * acceleration;
@@ -287,7 +287,7 @@ fn move_all<L: Lane, const TURN: bool>(
             let angular = torque * L::splat(spin[3]);
             let half_spin = L::load(spin) + kick * angular;
             half_spin.store(spin);
-            L::select(vector, half_spin + half * angular, L::splat(numbers[3])).store(&mut numbers[8..]);
+            L::select(vector, half_spin + half * angular, inverse_mass).store(&mut numbers[8..]);
             if motion.orientation {
                 slice.orientation[index] = turned(slice.orientation[index], trimmed(*spin), new);
             }
@@ -312,7 +312,7 @@ fn move_all<L: Lane, const TURN: bool>(
         }
         half_velocity.store(velocity);
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
-        L::select(vector, half_velocity + half * acceleration, inverse_mass).store(&mut numbers[4..8]);
+        L::select(vector, half_velocity + half * acceleration, L::splat(numbers[3])).store(&mut numbers[4..8]);
         let moved = position - stretch * three(*reference, 0.0);
         let mut squares = [0.0; 4];
         (moved * moved).store(&mut squares);
@@ -366,7 +366,7 @@ fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times
     let record = W::gather(&slice.record[index..], &offsets);
     let body = Body {
         semi_axes: [a, b, c],
-        inverse_mass: record[7],
+        inverse_mass: record[11],
         orientation: [w, x, y, z],
         spin: [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])],
         torque: [W::load(&torque[0]), W::load(&torque[1]), W::load(&torque[2])],

@@ -15,15 +15,15 @@ pub struct Record {
     pub radius: f64,
     /// Velocity at the full step \[m/s\] (BCT: peculiar, BC: absolute).
     pub velocity: [f64; 3],
-    /// 1/m \[1/kg\]; 0 for driven particles.
-    pub inverse_mass: f64,
+    /// The radius once more \[m\]: the contact pass needs the difference of two radii and their sum.
+    pub radius_again: f64,
     /// Angular velocity at the full step \[rad/s\].
     pub spin: [f64; 3],
-    /// The radius once more \[m\]: a vector of four holds it beside the position and beside the spin.
-    pub radius_again: f64,
+    /// 1/m \[1/kg\]; 0 for driven particles.
+    pub inverse_mass: f64,
 }
 
-/// Numbers of a [`Record`]: position, radius, velocity, 1/m, spin, radius.
+/// Numbers of a [`Record`]: position, radius, velocity, radius, spin, 1/m.
 pub const RECORD: usize = size_of::<Record>() / size_of::<f64>();
 
 /// What is constant over all particles of a species.

@@ -237,7 +237,7 @@ pub fn ellipsoids<L: Lane>(
         spin_about_normal: half * dot(bodies.spin_sum, normal),
     };
     let pair = PairTouch {
-        touching: !(L::splat(TOUCH_TOLERANCE) * heights).at_least(overlap),
+        touching: (L::splat(TOUCH_TOLERANCE) * heights).not_at_least(overlap),
         touch,
         branch,
         imposed_velocity: bodies.imposed_velocity,
@@ -273,7 +273,7 @@ pub fn wall(a: &Record, shape: &Shape, wall: u32, motion: &CellMotion) -> Ellips
         ..plane
     };
     let pair = PairTouch {
-        touching: !(TOUCH_TOLERANCE * height).at_least(overlap),
+        touching: (TOUCH_TOLERANCE * height).not_at_least(overlap),
         touch,
         branch,
         imposed_velocity,

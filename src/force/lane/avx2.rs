@@ -77,14 +77,14 @@ unsafe fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
 /// # Safety
 /// The processor has AVX2; `a` and `b` point at records.
 #[inline(always)]
-pub(super) unsafe fn relative_rows(a: *const f64, b: *const f64) -> [__m256d; 3] {
+pub(super) unsafe fn relative_rows<const EQUAL: bool>(a: *const f64, b: *const f64) -> [__m256d; 3] {
     // SAFETY: as the function's: twelve numbers lie at each address. b + a is b − (−a).
     unsafe {
         let fourth = _mm256_setr_pd(0.0, 0.0, 0.0, -0.0);
         let from = |numbers: *const f64, group: usize| _mm256_loadu_pd(numbers.add(4 * group));
         [
             _mm256_sub_pd(from(b, 0), from(a, 0)),
-            _mm256_sub_pd(from(b, 1), _mm256_xor_pd(from(a, 1), fourth)),
+            _mm256_sub_pd(from(b, 1), if EQUAL { from(a, 1) } else { _mm256_xor_pd(from(a, 1), fourth) }),
             _mm256_add_pd(from(b, 2), from(a, 2)),
         ]
     }
@@ -171,6 +171,11 @@ impl Lane for F64x4 {
         Mask4(unsafe { _mm256_cmp_pd::<_CMP_GE_OQ>(self.0, other.0) })
     }
     #[inline(always)]
+    fn not_at_least(self, other: Self) -> Mask4 {
+        // SAFETY: the processor has AVX2 (head of this file).
+        Mask4(unsafe { _mm256_cmp_pd::<_CMP_NGE_UQ>(self.0, other.0) })
+    }
+    #[inline(always)]
     fn select(mask: Mask4, yes: Self, no: Self) -> Self {
         // SAFETY: the processor has AVX2 (head of this file).
         Self(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
@@ -208,12 +213,12 @@ impl Lane for F64x4 {
         columns
     }
     #[inline(always)]
-    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
         let (first, second) = (rows_of(records, first), rows_of(records, second));
         let mut rows = [[Self::splat(0.0).0; 4]; 3];
         for k in 0..4 {
             // SAFETY: the processor has AVX2 (head of this file); the rows point at records.
-            [rows[0][k], rows[1][k], rows[2][k]] = unsafe { relative_rows(first[k], second[k]) };
+            [rows[0][k], rows[1][k], rows[2][k]] = unsafe { relative_rows::<EQUAL>(first[k], second[k]) };
         }
         let mut columns = [[Self::splat(0.0); 4]; 3];
         for group in 0..3 {

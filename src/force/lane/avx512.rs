@@ -199,6 +199,11 @@ impl Lane for F64x8 {
         Mask8(unsafe { _mm512_cmp_pd_mask::<_CMP_GE_OQ>(self.0, other.0) })
     }
     #[inline(always)]
+    fn not_at_least(self, other: Self) -> Mask8 {
+        // SAFETY: the processor has AVX-512 (head of this file).
+        Mask8(unsafe { _mm512_cmp_pd_mask::<_CMP_NGE_UQ>(self.0, other.0) })
+    }
+    #[inline(always)]
     fn select(mask: Mask8, yes: Self, no: Self) -> Self {
         // SAFETY: the processor has AVX-512 (head of this file).
         Self(unsafe { _mm512_mask_blend_pd(mask.0, no.0, yes.0) })
@@ -234,14 +239,15 @@ impl Lane for F64x8 {
         columns
     }
     #[inline(always)]
-    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
         let (first, second) = (rows_of(records, first), rows_of(records, second));
         let mut result = [[Self::splat(0.0); 4]; 3];
         // SAFETY: the processor has AVX-512 (head of this file); the rows point at records.
         unsafe {
             let mut rows = [[_mm512_setzero_pd(); 4]; 3];
             for (k, (low, high)) in [(0, 2), (1, 3), (4, 6), (5, 7)].into_iter().enumerate() {
-                let (low, high) = (relative_rows(first[low], second[low]), relative_rows(first[high], second[high]));
+                let rows_of_pair = |k: usize| relative_rows::<EQUAL>(first[k], second[k]);
+                let (low, high) = (rows_of_pair(low), rows_of_pair(high));
                 for group in 0..3 {
                     rows[group][k] = _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low[group]), high[group]);
                 }

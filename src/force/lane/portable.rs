@@ -146,8 +146,8 @@ impl<const N: usize> Lane for Portable<N> {
         std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
     }
     #[inline(always)]
-    fn relative(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let rows: [_; N] = std::array::from_fn(|k| f64::relative(records, [&first[k..], &second[k..]]));
+    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::relative::<EQUAL>(records, [&first[k..], &second[k..]]));
         std::array::from_fn(|group| std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][group][c]))))
     }
     #[inline(always)]

@@ -4,7 +4,7 @@ use super::{LEDGER_STRIDE, LineRing};
 use crate::contact::section::{BLOCK, CacheLine};
 use crate::force::composition::MAX_MEMORY;
 use crate::force::geometry::PairTouch;
-use crate::force::lane::{Lane, add, cross, dot, scale, sub};
+use crate::force::lane::{Lane, add, cross, dot, for_each_group, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{ContactLaw, ContactResponse, MAX_EARLY};
@@ -16,6 +16,8 @@ pub(super) struct Laws<'a, C> {
     pub law: &'a C,
     pub stride: usize,
     pub time_step: f64,
+    /// All spheres have the same radius.
+    pub equal: bool,
 }
 
 impl<C: ContactLaw> Laws<'_, C> {
@@ -49,10 +51,9 @@ impl<C: ContactLaw> Laws<'_, C> {
         memory: &mut [CacheLine],
         lines: &mut LineRing,
     ) {
-        let lanes = || (0..BLOCK / L::WIDTH).map(|group| group * L::WIDTH);
         let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
         for (block, touches) in touches.iter_mut().enumerate() {
-            for lane in lanes() {
+            for_each_group!(L, lane, {
                 let pair = touches.touch::<L>(lane);
                 let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
                     self.law.normal(&pair.touch, memory)
@@ -65,12 +66,12 @@ impl<C: ContactLaw> Laws<'_, C> {
                     self.law.early(&pair.touch, &normal, rest, &mut early[..C::EARLY]);
                     touches.put_early(lane, &early[..C::EARLY]);
                 }
-            }
+            });
         }
         for (block, touches) in touches.iter().enumerate() {
             let slot = ((lines.first + block * BLOCK) & lines.mask) * self.stride;
             let rows = &mut lines.values[slot..slot + BLOCK * self.stride];
-            for lane in lanes() {
+            for_each_group!(L, lane, {
                 let rows = &mut rows[lane * self.stride..];
                 let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
                 let mut early = [L::splat(0.0); MAX_EARLY];
@@ -80,7 +81,7 @@ impl<C: ContactLaw> Laws<'_, C> {
                     self.law.complete(&pair.touch, &normal, &early[..C::EARLY], memory)
                 });
                 self.write::<L, LEDGER>(&pair, &response, rows, false);
-            }
+            });
         }
     }
 
@@ -118,7 +119,7 @@ impl<C: ContactLaw> Laws<'_, C> {
         if own >= 8 {
             let turning = cross(pair.touch.normal, tangential);
             let mut first = scale(turning, pair.arm_first);
-            let mut second = scale(turning, pair.arm_second);
+            let mut second = scale(turning, if self.equal { pair.arm_first } else { pair.arm_second });
             if C::ROLLING {
                 let moment = response.moment.map(kept);
                 (first, second) = (add(first, moment), sub(second, moment));

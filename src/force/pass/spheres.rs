@@ -3,8 +3,8 @@
 use super::{Excess, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, Section};
 use crate::contact::shift;
-use crate::force::geometry::{self, PairTouch, Relative};
-use crate::force::lane::{Lane, is_far, prefetch};
+use crate::force::geometry::{self, CellMotion, PairTouch, Relative};
+use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
@@ -12,8 +12,9 @@ use crate::force::touches::{BATCH, BlockTouches, Content};
 use crate::state::particles::{RECORD, Record};
 use std::ops::Range;
 
-/// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number.
-pub(super) fn geometry(
+/// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number. `EQUAL`: all
+/// spheres have the same radius, which the touches know ([`BlockTouches::put_radius`]).
+pub(super) fn geometry<const EQUAL: bool>(
     input: &PassInput,
     records: &[Record],
     section: &Section,
@@ -24,17 +25,17 @@ pub(super) fn geometry(
     match input.simd {
         // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512 => unsafe { geometry_avx512(input, records, section, blocks, content, touches) },
+        Simd::Avx512 => unsafe { geometry_avx512::<EQUAL>(input, records, section, blocks, content, touches) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2 => unsafe { geometry_avx2(input, records, section, blocks, content, touches) },
-        _ => geometry_of::<f64>(input, records, section, blocks, content, touches),
+        Simd::Avx2 => unsafe { geometry_avx2::<EQUAL>(input, records, section, blocks, content, touches) },
+        _ => geometry_of::<f64, EQUAL>(input, records, section, blocks, content, touches),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn geometry_avx2(
+fn geometry_avx2<const EQUAL: bool>(
     input: &PassInput,
     records: &[Record],
     section: &Section,
@@ -42,12 +43,12 @@ fn geometry_avx2(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    geometry_of::<F64x4>(input, records, section, blocks, content, touches)
+    geometry_of::<F64x4, EQUAL>(input, records, section, blocks, content, touches)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl")]
-fn geometry_avx512(
+fn geometry_avx512<const EQUAL: bool>(
     input: &PassInput,
     records: &[Record],
     section: &Section,
@@ -55,11 +56,11 @@ fn geometry_avx512(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    geometry_of::<F64x8>(input, records, section, blocks, content, touches)
+    geometry_of::<F64x8, EQUAL>(input, records, section, blocks, content, touches)
 }
 
 #[inline(always)]
-fn geometry_of<L: Lane>(
+fn geometry_of<L: Lane, const EQUAL: bool>(
     input: &PassInput,
     records: &[Record],
     section: &Section,
@@ -67,7 +68,6 @@ fn geometry_of<L: Lane>(
     content: Content,
     touches: &mut [BlockTouches; BATCH],
 ) -> Excess {
-    let lanes = || (0..BLOCK / L::WIDTH).map(|group| group * L::WIDTH);
     let (first, second) = (section.first.as_chunks::<BLOCK>().0, section.second.as_chunks::<BLOCK>().0);
     let pairs = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
     let codes = &section.shift.as_chunks::<BLOCK>().0[blocks.clone()];
@@ -82,54 +82,68 @@ fn geometry_of<L: Lane>(
                 prefetch(numbers, (*first).max(*second) as usize, RECORD);
             }
         }
-        for lane in lanes() {
-            let pair = Relative::<L>::of(records, [&pair.0[lane..], &pair.1[lane..]]);
-            touches.put_relative(lane, &pair);
-            unequal = unequal | pair.unequal();
-        }
+        for_each_group!(L, lane, {
+            let pair = Relative::<L>::of::<EQUAL>(records, [&pair.0[lane..], &pair.1[lane..]]);
+            touches.put_relative::<L, EQUAL>(lane, &pair);
+            if !EQUAL {
+                unequal = unequal | pair.unequal();
+            }
+        });
         // Away from periodic faces there is nothing to look up.
         if motion.faces_move || !shift::all_here(codes) {
-            for lane in lanes() {
+            for_each_group!(L, lane, {
                 let mut pair = touches.relative::<L>(lane);
                 pair.enter_images(&codes[lane..], motion);
                 touches.put_images(lane, &pair);
-            }
+            });
         }
     }
     let unequal = L::any(unequal);
     if content.rolling || unequal {
         for (pair, touches) in pairs.zip(touches.iter_mut()) {
-            for lane in lanes() {
+            for_each_group!(L, lane, {
                 let spin = L::relative_spin(records, [&pair.0[lane..], &pair.1[lane..]]);
                 touches.put_relative_spin(lane, &spin);
-            }
+            });
         }
     }
-    let touch = |touches: &BlockTouches, lane: usize| {
-        let mut pair = touches.relative::<L>(lane);
-        pair.follow_cell(motion);
-        geometry::touch(&pair, unequal)
-    };
-    // Written so that NaN counts as a fault.
-    let limit = L::splat(input.max_overlap_fraction);
-    let beyond = |pair: &PairTouch<L>| pair.touching & !(limit * pair.min_radius).at_least(pair.touch.overlap);
+    let radius = records.first().map_or(0.0, |record| record.radius);
+    let limit = input.max_overlap_fraction;
     let mut faulty = never;
     let touches = &mut touches[..blocks.len()];
     for touches in &mut *touches {
-        for lane in lanes() {
-            let pair = touch(touches, lane);
-            touches.put_touch(lane, &pair, content);
-            faulty = faulty | beyond(&pair);
-        }
+        for_each_group!(L, lane, {
+            let pair = touch_of::<L, EQUAL>(touches, lane, radius, motion, unequal);
+            touches.put_touch::<L, EQUAL>(lane, &pair, content);
+            // Written so that NaN counts as a fault.
+            let beyond = (L::splat(limit) * pair.min_radius).not_at_least(pair.touch.overlap);
+            faulty = faulty | pair.touching & beyond;
+        });
     }
     if !L::any(faulty) {
         return None;
     }
     blocks.zip(touches).find_map(|(block, touches)| {
-        lanes().find_map(|lane| {
-            let pair = touch(touches, lane);
-            let (overlap, place) = (pair.touch.overlap, block * BLOCK + lane);
-            first_excess(pair.touching, overlap, pair.min_radius, input.max_overlap_fraction, place)
+        (0..BLOCK).find_map(|lane| {
+            let pair = touch_of::<f64, EQUAL>(touches, lane, radius, motion, unequal);
+            first_excess(pair.touching, pair.touch.overlap, pair.min_radius, limit, block * BLOCK + lane)
         })
     })
+}
+
+/// One group of lanes of a block whose bodies are known.
+#[inline(always)]
+fn touch_of<L: Lane, const EQUAL: bool>(
+    touches: &BlockTouches,
+    lane: usize,
+    radius: f64,
+    motion: &CellMotion,
+    unequal: bool,
+) -> PairTouch<L> {
+    let mut pair = touches.relative::<L>(lane);
+    if EQUAL {
+        pair.equal(radius);
+    }
+    pair.follow_cell(motion);
+    geometry::touch(&pair, unequal)
 }
