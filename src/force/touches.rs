@@ -8,7 +8,7 @@ use super::law::{Energies, MAX_EARLY, NormalResponse, Touch};
 use crate::contact::section::{BLOCK, CacheLine};
 
 /// Blocks in a batch: few, so that they stay in the nearest cache.
-pub const BATCH: usize = 4;
+pub const BATCH: usize = 8;
 
 /// Stands for the overlap of lanes whose law is not asked.
 const DEAD: f64 = f64::NEG_INFINITY;
@@ -52,8 +52,8 @@ impl<const N: usize> Numbers<N> {
 /// The contacts of one block between the stages.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockTouches {
-    relative: Numbers<12>,
-    touch: Numbers<11>,
+    /// The bodies; then, in their place, the touch.
+    numbers: Numbers<12>,
     arms: Numbers<2>,
     normal: Numbers<3>,
     /// What the tangential law hands on.
@@ -69,8 +69,7 @@ pub struct BlockTouches {
 impl BlockTouches {
     /// All zero.
     pub const ZERO: Self = Self {
-        relative: Numbers::ZERO,
-        touch: Numbers::ZERO,
+        numbers: Numbers::ZERO,
         arms: Numbers::ZERO,
         normal: Numbers::ZERO,
         early: Numbers::ZERO,
@@ -82,25 +81,25 @@ impl BlockTouches {
     /// Take in the bodies of the lanes from `lane` on, without what the cell imposes. `EQUAL`: without the radii.
     #[inline(always)]
     pub fn put_relative<L: Lane, const EQUAL: bool>(&mut self, lane: usize, pair: &Relative<L>) {
-        self.relative.put(0, lane, &pair.branch);
-        self.relative.put(3, lane, &pair.velocity);
-        self.relative.put(6, lane, &pair.spin_sum);
-        self.relative.put(9, lane, &[pair.inverse_masses]);
+        self.numbers.put(0, lane, &pair.branch);
+        self.numbers.put(3, lane, &pair.velocity);
+        self.numbers.put(6, lane, &pair.spin_sum);
+        self.numbers.put(9, lane, &[pair.inverse_masses]);
         if !EQUAL {
-            self.relative.put(10, lane, &[pair.radius_sum, pair.radius_difference]);
+            self.numbers.put(10, lane, &[pair.radius_sum, pair.radius_difference]);
         }
     }
 
     /// Take in what `EQUAL` leaves out: all spheres have this radius.
     pub fn put_radius(&mut self, radius: f64) {
-        self.relative.0[10].0 = [radius + radius; BLOCK];
-        self.touch.0[10].0 = [0.25 * (radius + radius); BLOCK];
+        self.numbers.0[10].0 = [radius + radius; BLOCK];
+        self.numbers.0[11].0 = [0.25 * (radius + radius); BLOCK];
     }
 
     /// Take in the branch vectors of the lanes from `lane` on again, and the imposed velocity.
     #[inline(always)]
     pub fn put_images<L: Lane>(&mut self, lane: usize, pair: &Relative<L>) {
-        self.relative.put(0, lane, &pair.branch);
+        self.numbers.put(0, lane, &pair.branch);
         self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
     }
 
@@ -115,12 +114,12 @@ impl BlockTouches {
     #[must_use]
     pub fn relative<L: Lane>(&self, lane: usize) -> Relative<L> {
         Relative {
-            branch: self.relative.vector(0, lane),
-            velocity: self.relative.vector(3, lane),
-            spin_sum: self.relative.vector(6, lane),
-            inverse_masses: self.relative.one(9, lane),
-            radius_sum: self.relative.one(10, lane),
-            radius_difference: self.relative.one(11, lane),
+            branch: self.numbers.vector(0, lane),
+            velocity: self.numbers.vector(3, lane),
+            spin_sum: self.numbers.vector(6, lane),
+            inverse_masses: self.numbers.one(9, lane),
+            radius_sum: self.numbers.one(10, lane),
+            radius_difference: self.numbers.one(11, lane),
             relative_spin: self.relative_spin.vector(0, lane),
             imposed_velocity: self.imposed_velocity.vector(0, lane),
         }
@@ -132,12 +131,12 @@ impl BlockTouches {
     pub fn put_touch<L: Lane, const EQUAL: bool>(&mut self, lane: usize, pair: &PairTouch<L>, content: Content) {
         let touch = &pair.touch;
         let overlap = L::select(pair.alive(content.range), touch.overlap, L::splat(DEAD));
-        self.touch.put(0, lane, &[overlap, touch.overlap_rate, touch.effective_mass, touch.spin_about_normal]);
-        self.touch.put(4, lane, &touch.normal);
-        self.touch.put(7, lane, &touch.slip_velocity);
+        self.numbers.put(0, lane, &touch.normal);
+        self.numbers.put(3, lane, &touch.slip_velocity);
+        self.numbers.put(6, lane, &[overlap, touch.overlap_rate, touch.spin_about_normal, touch.effective_mass]);
         self.arms.put(0, lane, &[pair.arm_first]);
         if !EQUAL {
-            self.touch.put(10, lane, &[touch.effective_radius]);
+            self.numbers.put(11, lane, &[touch.effective_radius]);
             self.arms.put(1, lane, &[pair.arm_second]);
         }
         if content.ledger {
@@ -149,21 +148,21 @@ impl BlockTouches {
     #[inline(always)]
     #[must_use]
     pub fn touch<L: Lane>(&self, lane: usize) -> LawTouch<L> {
-        let overlap = self.touch.one(0, lane);
+        let overlap = self.numbers.one(6, lane);
         LawTouch {
             // NaN is alive.
             alive: L::splat(DEAD).not_at_least(overlap),
             touch: Touch {
                 overlap,
-                overlap_rate: self.touch.one(1, lane),
-                effective_radius: self.touch.one(10, lane),
+                overlap_rate: self.numbers.one(7, lane),
+                effective_radius: self.numbers.one(11, lane),
                 radius_factor: L::splat(1.0),
                 overlap_factor: L::splat(1.0),
-                size: self.relative.one(10, lane),
-                effective_mass: self.touch.one(2, lane),
-                normal: self.touch.vector(4, lane),
-                slip_velocity: self.touch.vector(7, lane),
-                spin_about_normal: self.touch.one(3, lane),
+                size: self.numbers.one(10, lane),
+                effective_mass: self.numbers.one(9, lane),
+                normal: self.numbers.vector(0, lane),
+                slip_velocity: self.numbers.vector(3, lane),
+                spin_about_normal: self.numbers.one(8, lane),
                 relative_spin: self.relative_spin.vector(0, lane),
             },
             arm_first: self.arms.one(0, lane),

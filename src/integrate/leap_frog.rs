@@ -264,7 +264,7 @@ fn move_all<L: Lane, const TURN: bool>(
     let (kick, half) = (three([0.5 * (old + new); 3], 0.0), three([0.5 * new; 3], 0.0));
     let drift = three([0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new), 0.0);
     let scale = three(motion.scale, 1.0);
-    let gravity = three(motion.gravity, 0.0);
+    let (gravity, falls) = (three(motion.gravity, 0.0), motion.gravity != [0.0; 3]);
     let sides = three(motion.sides, f64::INFINITY);
     let stretch = three([0, 1, 2].map(|k| motion.sides[k] / motion.reference_sides[k]), 0.0);
     let bodies = slice.record[range.clone()].iter_mut().zip(&mut slice.velocity[range.clone()]);
@@ -278,8 +278,10 @@ fn move_all<L: Lane, const TURN: bool>(
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
         let inverse_mass = L::splat(numbers[11]);
-        let pull = L::select(inverse_mass.greater(zero), gravity, zero);
-        let acceleration = force * inverse_mass + pull;
+        let mut acceleration = force * inverse_mass;
+        if falls {
+            acceleration = acceleration + L::select(inverse_mass.greater(zero), gravity, zero);
+        }
         let mut half_velocity = L::load(velocity) + kick * acceleration;
         let mut position = scale * L::load(&numbers[..4]) + drift * half_velocity;
         // The fourth numbers come from splats: stores of some lanes only are slow.

@@ -3,7 +3,7 @@
 use super::{Excess, PassInput, RECORDS_AHEAD, first_excess};
 use crate::contact::section::{BLOCK, Section};
 use crate::contact::shift;
-use crate::force::geometry::{self, CellMotion, PairTouch, Relative};
+use crate::force::geometry::{self, Relative};
 use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
@@ -110,10 +110,14 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     let radius = records.first().map_or(0.0, |record| record.radius);
     let limit = input.max_overlap_fraction;
     let mut faulty = never;
-    let touches = &mut touches[..blocks.len()];
-    for touches in &mut *touches {
+    for touches in &mut touches[..blocks.len()] {
         for_each_group!(L, lane, {
-            let pair = touch_of::<L, EQUAL>(touches, lane, radius, motion, unequal);
+            let mut pair = touches.relative::<L>(lane);
+            if EQUAL {
+                pair.equal(radius);
+            }
+            pair.follow_cell(motion);
+            let pair = geometry::touch(&pair, unequal);
             touches.put_touch::<L, EQUAL>(lane, &pair, content);
             // Written so that NaN counts as a fault.
             let beyond = (L::splat(limit) * pair.min_radius).not_at_least(pair.touch.overlap);
@@ -123,27 +127,9 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     if !L::any(faulty) {
         return None;
     }
-    blocks.zip(touches).find_map(|(block, touches)| {
-        (0..BLOCK).find_map(|lane| {
-            let pair = touch_of::<f64, EQUAL>(touches, lane, radius, motion, unequal);
-            first_excess(pair.touching, pair.touch.overlap, pair.min_radius, limit, block * BLOCK + lane)
-        })
+    (blocks.start * BLOCK..blocks.end * BLOCK).find_map(|place| {
+        let pair = [&section.first[place..=place], &section.second[place..=place]];
+        let pair = geometry::spheres::<f64>(records, pair, &section.shift[place..=place], motion);
+        first_excess(pair.touching, pair.touch.overlap, pair.min_radius, limit, place)
     })
-}
-
-/// One group of lanes of a block whose bodies are known.
-#[inline(always)]
-fn touch_of<L: Lane, const EQUAL: bool>(
-    touches: &BlockTouches,
-    lane: usize,
-    radius: f64,
-    motion: &CellMotion,
-    unequal: bool,
-) -> PairTouch<L> {
-    let mut pair = touches.relative::<L>(lane);
-    if EQUAL {
-        pair.equal(radius);
-    }
-    pair.follow_cell(motion);
-    geometry::touch(&pair, unequal)
 }
