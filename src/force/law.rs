@@ -11,7 +11,7 @@
 use super::lane::{Lane, Vector};
 
 /// Most numbers that a law may hand on, see [`TangentialLaw::early`].
-pub const MAX_EARLY: usize = 9;
+pub const MAX_EARLY: usize = 18;
 
 /// Geometry and relative motion of one touch, at the full step.
 #[derive(Debug, Clone, Copy)]

@@ -139,15 +139,16 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         }
     }
 
-    const EARLY: usize = SPRINGS;
+    const EARLY: usize = 2 * SPRINGS;
 
-    /// The shares that bring the turned springs to their lengths.
+    /// Of each spring [`Turning::early`].
     #[inline(always)]
     fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]) {
         let turning = Turning::new(touch, self.time_step);
-        for (k, share) in early.iter_mut().enumerate() {
+        for k in 0..SPRINGS {
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            *share = turning.share(stored, normal.contact_radius, memory[3 * SPRINGS]);
+            let both = turning.early(stored, normal.contact_radius, memory[3 * SPRINGS]);
+            early[2 * k..2 * k + 2].copy_from_slice(&both);
         }
     }
 
@@ -170,7 +171,7 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         let mut carried = [[zero; 3]; SPRINGS];
         for k in 0..SPRINGS {
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            carried[k] = scale(turning.turn(stored), early[k]);
+            carried[k] = scale(turning.turn(stored, early[2 * k]), early[2 * k + 1]);
             advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * radius);
             trial[k] = add(carried[k], advance[k]);
         }

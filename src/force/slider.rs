@@ -19,23 +19,23 @@ impl<L: Lane> Turning<L> {
         Self { normal: touch.normal, angle: touch.spin_about_normal * L::splat(time_step) }
     }
 
-    /// The vector after the step: [`Self::turn`] times [`Self::share`].
+    /// The vector after the step.
     #[inline(always)]
     #[must_use]
     pub fn apply(&self, stored: Vector<L>, stiffness: L, last: L) -> Vector<L> {
-        scale(self.turn(stored), self.share(stored, stiffness, last))
+        let [along, share] = self.early(stored, stiffness, last);
+        scale(self.turn(stored, along), share)
     }
 
-    /// The vector projected on the new tangent plane and turned, not yet of the right length. The angle φ about n is
-    /// taken as arctan φ (third order in Δt).
+    /// The vector projected on the new tangent plane and turned, not yet of the right length; `along` is its part along
+    /// n. The angle φ about n is taken as arctan φ (third order in Δt).
     #[inline(always)]
     #[must_use]
-    pub fn turn(&self, stored: Vector<L>) -> Vector<L> {
-        let along = dot(stored, self.normal);
+    pub fn turn(&self, stored: Vector<L>, along: L) -> Vector<L> {
         add(sub(stored, scale(self.normal, along)), scale(cross(self.normal, stored), self.angle))
     }
 
-    /// What brings the turned vector to the length that it has after the step.
+    /// The part of the vector along n, and what brings the turned vector to the length that it has after the step.
     ///
     /// It shrinks with the stiffness: a spring keeps `min(1, stiffness/last stiffness)` of its force, so that
     /// unloading creates no energy. A vector without a last stiffness (first touch) is zero.
@@ -46,7 +46,7 @@ impl<L: Lane> Turning<L> {
     /// so that a vector that turns too fast shrinks.
     #[inline(always)]
     #[must_use]
-    pub fn share(&self, stored: Vector<L>, stiffness: L, last: L) -> L {
+    pub fn early(&self, stored: Vector<L>, stiffness: L, last: L) -> [L; 2] {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let along = dot(stored, self.normal);
         let square = dot(stored, stored);
@@ -57,7 +57,7 @@ impl<L: Lane> Turning<L> {
         let lost = (tilt + self.angle * self.angle * (tilt - one)).max(-one);
         let stretch = one + lost * (L::splat(0.5) + lost * (L::splat(0.375) + lost * L::splat(0.3125)));
         let kept = (stiffness * (square * inverse)).min(one);
-        L::select(both.greater(zero), stretch * kept, zero)
+        [along, L::select(both.greater(zero), stretch * kept, zero)]
     }
 }
 
