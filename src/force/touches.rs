@@ -6,6 +6,7 @@ use super::geometry::{PairTouch, Relative};
 use super::lane::{Lane, Vector};
 use super::law::{Energies, MAX_EARLY, NormalResponse, Touch};
 use crate::contact::section::{BLOCK, CacheLine};
+use bytemuck::Zeroable;
 
 /// Blocks in a batch: few, so that they stay in the nearest cache.
 pub const BATCH: usize = 8;
@@ -25,12 +26,11 @@ pub struct Content {
 }
 
 /// Some numbers of each contact of a block.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Zeroable)]
+#[repr(transparent)]
 struct Numbers<const N: usize>([CacheLine; N]);
 
 impl<const N: usize> Numbers<N> {
-    const ZERO: Self = Self([CacheLine([0.0; BLOCK]); N]);
-
     #[inline(always)]
     fn put<L: Lane>(&mut self, number: usize, lane: usize, values: &[L]) {
         for (line, value) in self.0[number..].iter_mut().zip(values) {
@@ -50,7 +50,7 @@ impl<const N: usize> Numbers<N> {
 }
 
 /// The contacts of one block between the stages.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Zeroable)]
 pub struct BlockTouches {
     /// The bodies; then, in their place, the touch.
     numbers: Numbers<12>,
@@ -67,17 +67,6 @@ pub struct BlockTouches {
 }
 
 impl BlockTouches {
-    /// All zero.
-    pub const ZERO: Self = Self {
-        numbers: Numbers::ZERO,
-        arms: Numbers::ZERO,
-        normal: Numbers::ZERO,
-        early: Numbers::ZERO,
-        relative_spin: Numbers::ZERO,
-        imposed_velocity: Numbers::ZERO,
-        energies: Numbers::ZERO,
-    };
-
     /// Take in the bodies of the lanes from `lane` on, without what the cell imposes. `EQUAL`: without the radii.
     #[inline(always)]
     pub fn put_relative<L: Lane, const EQUAL: bool>(&mut self, lane: usize, pair: &Relative<L>) {

@@ -32,7 +32,7 @@ struct Ring {
 
 impl Default for Ring {
     fn default() -> Self {
-        Self { lines: Vec::new(), touches: Box::new([BlockTouches::ZERO; BATCH]), loads: Box::new([[0.0; 8]; CHUNK]) }
+        Self { lines: Vec::new(), touches: bytemuck::zeroed_box(), loads: bytemuck::zeroed_box() }
     }
 }
 
