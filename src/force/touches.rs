@@ -9,7 +9,7 @@ use crate::contact::section::{BLOCK, CacheLine};
 use bytemuck::Zeroable;
 
 /// Blocks in a batch: few, so that they stay in the nearest cache.
-pub const BATCH: usize = 8;
+pub const BATCH: usize = 4;
 
 /// Stands for the overlap of lanes whose law is not asked.
 const DEAD: f64 = f64::NEG_INFINITY;
