@@ -405,3 +405,6 @@ fn first_excess<L: Lane>(touching: L::Mask, overlap: L, radius: L, limit: f64, p
     };
     (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlaps[lane] / radii[lane]))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+use super::*;
+use crate::contact::shift::{self, ShiftTable};
+use crate::force::registry::Role;
+use crate::force::testing::{choice, pair, properties, pvdf};
+
+const RADIUS: f64 = 1e-3;
+const PAIRS: usize = 45;
+const STEPS: usize = 4;
+
+/// A crooked chain: some particles overlap the next one a little, others do not reach it; all move and turn.
+fn records() -> Vec<Record> {
+    let number = |n: usize, k: usize| ((n * 37 + k * 101) % 89) as f64 / 89.0 - 0.5;
+    (0..=PAIRS)
+        .map(|n| Record {
+            position: [n as f64 * 1.97 * RADIUS, number(n, 1) * 5.5e-4, number(n, 2) * 5.5e-4],
+            radius: RADIUS,
+            velocity: [0, 1, 2].map(|k| 0.1 * number(n, 3 + k)),
+            radius_again: RADIUS,
+            spin: [0, 1, 2].map(|k| 50.0 * number(n, 6 + k)),
+            inverse_mass: 1e5 * (1.5 + number(n, 9)),
+        })
+        .collect()
+}
+
+/// Bits of force and torque on the first of each pair and of its memory after some steps.
+fn run(config: &PairConfig, bodies: Bodies, simd: Simd) -> Vec<u64> {
+    let mut pass = build(config, bodies);
+    let time_step = 1e-5;
+    pass.prepare(time_step, false);
+    let columns = pass.columns().len();
+    let mut section = Section::new(0, Partners::Near, columns, 0);
+    section.resize(PAIRS);
+    for place in 0..PAIRS {
+        section.set(place, place as u32, place as u32 + 1, shift::encode([0; 3]));
+    }
+    let motion = CellMotion {
+        sides: [1.0; 3],
+        shift: ShiftTable::new([1.0; 3]),
+        shift_velocity: ShiftTable::new([0.0; 3]),
+        faces_move: false,
+        gradient: [0.0, 0.0, -0.5],
+        wall_velocity: [0.0; 3],
+    };
+    let stride = pass.stride();
+    let input = PassInput { motion: &motion, stride, ledger: false, max_overlap_fraction: 0.5, time_step, simd };
+    let mut records = records();
+    let mut lines = vec![0.0; section.blocks() * BLOCK * stride];
+    let mut touches: Box<[BlockTouches; BATCH]> = bytemuck::zeroed_box();
+    for _ in 0..STEPS {
+        let blocks = 0..section.blocks();
+        let lines = LineRing { values: &mut lines, first: 0, mask: usize::MAX };
+        let bodies = BodyData { records: &records, shapes: &[] };
+        let job = Job { input: &input, bodies, section: &mut section, blocks, lines, touches: &mut touches };
+        assert_eq!(pass.run(job), None);
+        for record in &mut records {
+            for axis in 0..3 {
+                record.position[axis] += record.velocity[axis] * time_step;
+            }
+        }
+    }
+    let mut bits = Vec::new();
+    for (place, line) in lines.chunks(stride).take(PAIRS).enumerate() {
+        let mut memory = vec![0.0; columns];
+        section.read_memory(place, &mut memory);
+        bits.extend(line[..3].iter().chain(&line[4..7]).chain(&memory).map(|value| value.to_bits()));
+    }
+    bits
+}
+
+#[test]
+fn equal_radii_give_the_bits_of_any_radii_at_every_width() {
+    let mindlin = Some(choice(Role::Tangential, "mindlin", &[]));
+    let hertz = pair(properties(5e7, 0.25, Vec::new()), choice(Role::Normal, "hertz", &[]));
+    let relaxing = pair(pvdf(), choice(Role::Normal, "maxwell_zener", &[]));
+    let rolling = Some(choice(Role::Rolling, "spring_slider", &[]));
+    for config in [
+        PairConfig { tangential: mindlin.clone(), ..hertz.clone() },
+        PairConfig { tangential: mindlin.clone(), rolling, ..hertz },
+        PairConfig { tangential: mindlin, ..relaxing },
+    ] {
+        let expected = run(&config, Bodies::Spheres, Simd::Scalar);
+        let touching = expected.iter().filter(|bits| **bits != 0.0_f64.to_bits()).count();
+        assert!(touching > expected.len() / 3 && touching < expected.len(), "{touching} of {}", expected.len());
+        for simd in [Simd::Scalar, Simd::Avx2, Simd::Avx512].into_iter().filter(|level| level.is_available()) {
+            for bodies in [Bodies::Spheres, Bodies::EqualSpheres] {
+                assert!(run(&config, bodies, simd) == expected, "{bodies:?} {simd:?}");
+            }
+        }
+    }
+}
