@@ -65,7 +65,8 @@ impl BuildContext {
                     let (partner, code) = (candidates.partner[place] as usize, &mut candidates.code[place]);
                     let partners = if partner >= particles.owned {
                         Partners::Ghost
-                    } else if partner < strip.particles.end && *code & (LISTED - 1) & !Candidates::PARTNER_FIRST == here
+                    } else if strip.particles.contains(&partner)
+                        && *code & (LISTED - 1) & !Candidates::PARTNER_FIRST == here
                     {
                         Partners::Near
                     } else {

@@ -29,7 +29,7 @@ pub enum Partners {
 pub const PARTNERS: [Partners; 4] = [Partners::Near, Partners::Apart, Partners::Wall, Partners::Ghost];
 
 /// Contacts of one pair of materials with the same kind of partners, owned by the particles of one strip, in
-/// order of the owner (the particle with the lower local index). Padded to whole blocks; the padding pairs
+/// order of the owner (see [`crate::neighbour::verlet`]). Padded to whole blocks; the padding pairs
 /// particle 0 with its own far image and never touches.
 #[derive(Debug, Clone)]
 pub struct Section {

@@ -1,10 +1,12 @@
 //! The Verlet list: all pairs nearer than the sum of their radii plus the skin, each once, with every
-//! periodic image and own images, listed with their owner: the particle with the lower local index.
+//! periodic image and own images, listed with their owner: the particle with the lower local index, or, if the two
+//! are in different strips, either of them, so that every strip has its share.
 
 use super::cells::Bins;
 use crate::contact::shift::{encode, lexicographically_positive};
 use crate::state::particles::Particles;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Pairs that may come to touch, by owner. The shifts are those of the positions when the list was made;
 /// what particles cross after that comes on top.
@@ -100,9 +102,9 @@ impl Region {
     }
 
     /// The Verlet list of this rank: every pair with at least one owned particle, once. Pairs of two
-    /// driven particles are left out.
+    /// driven particles are left out. `strips` are runs of owned particles, ascending and without gaps.
     #[must_use]
-    pub fn candidates(&self, particles: &Particles) -> Candidates {
+    pub fn candidates(&self, particles: &Particles, strips: &[Range<usize>]) -> Candidates {
         const GRAIN: usize = 1024;
         let owned = particles.owned;
         let mut candidates = Candidates { offsets: vec![0], ..Candidates::default() };
@@ -119,7 +121,8 @@ impl Region {
             .map(|part| {
                 let mut found = Candidates::default();
                 for owner in part * GRAIN..((part + 1) * GRAIN).min(owned) {
-                    self.candidates_of(owner, particles, &points, &bins, &mut found);
+                    let strip = &strips[strips.partition_point(|strip| strip.end <= owner)];
+                    self.candidates_of(owner, strip, particles, &points, &bins, &mut found);
                     found.offsets.push(found.partner.len() as u32);
                 }
                 found
@@ -138,13 +141,24 @@ impl Region {
         candidates
     }
 
-    fn candidates_of(&self, owner: usize, particles: &Particles, points: &Points, bins: &Bins, found: &mut Candidates) {
+    fn candidates_of(
+        &self,
+        owner: usize,
+        strip: &Range<usize>,
+        particles: &Particles,
+        points: &Points,
+        bins: &Bins,
+        found: &mut Candidates,
+    ) {
         let record = particles.record[owner];
         let id = particles.id[owner];
         bins.for_each_near(record.position, |point| {
             let partner = points.particle[point] as usize;
-            // Two owned particles meet twice, once from each side: keep the lower index's view.
-            if partner < owner {
+            // Two owned particles meet twice, once from each side. Within a strip the lower index owns the pair; between
+            // two strips it does if it is even.
+            let lower_owns =
+                partner >= particles.owned || strip.contains(&partner) || owner.min(partner).is_multiple_of(2);
+            if partner != owner && (owner < partner) != lower_owns {
                 return;
             }
             let shift = points.shift[point];
@@ -166,5 +180,56 @@ impl Region {
                 u32::from(encode(shift.map(|s| -s))) | Candidates::PARTNER_FIRST
             });
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::particles::Record;
+    use bytemuck::Zeroable;
+
+    /// Pairs as (lower, higher) local index with the code, and how many each strip owns.
+    fn listed(strips: &[Range<usize>]) -> (Vec<(usize, usize, u32)>, Vec<usize>) {
+        // A cubic lattice of 8 x 8 x 8 touching spheres, two layers of which are ghosts.
+        let mut particles = Particles { owned: 384, ..Particles::default() };
+        for index in 0..512_u32 {
+            let position = [index / 64, index / 8 % 8, index % 8].map(|k| f64::from(k) + 0.5);
+            particles.record.push(Record { position, radius: 0.5, inverse_mass: 1.0, ..Record::zeroed() });
+            particles.id.push(index * 101 % 512);
+        }
+        let region = Region {
+            sides: [8.0; 3],
+            periodic: [true; 3],
+            low: [0.0; 3],
+            high: [6.0, 8.0, 8.0],
+            max_radius: 0.5,
+            skin: 0.1,
+        };
+        let candidates = region.candidates(&particles, strips);
+        let (mut pairs, mut owned) = (Vec::new(), vec![0; strips.len()]);
+        for owner in 0..particles.owned {
+            for place in candidates.offsets[owner] as usize..candidates.offsets[owner + 1] as usize {
+                let partner = candidates.partner[place] as usize;
+                let first = (candidates.code[place] & Candidates::PARTNER_FIRST == 0) == (owner < partner);
+                let shift = candidates.code[place] & (Candidates::PARTNER_FIRST - 1);
+                pairs.push((owner.min(partner), owner.max(partner), shift << 1 | u32::from(first)));
+                let strip = strips.iter().position(|strip| strip.contains(&owner)).expect("every owner is in a strip");
+                owned[strip] += 1;
+            }
+        }
+        pairs.sort_unstable();
+        (pairs, owned)
+    }
+
+    #[test]
+    fn strips_share_the_pairs_between_them_and_none_is_lost_or_doubled() {
+        let (pairs, _) = listed(&[0..384]);
+        // Three per owned particle, and the 64 from the ghosts to the owned ones above them.
+        assert_eq!(pairs.len(), 3 * 384 + 64);
+        let (same, owned) = listed(&[0..192, 192..384]);
+        assert_eq!(same, pairs);
+        // 64 pairs lie between the strips, each has 64 with ghosts.
+        assert_eq!(owned, [608, 608]);
     }
 }

@@ -125,11 +125,11 @@ impl Simulation {
         self.particles.reorder(&order);
         self.halo =
             HaloPlan::build(&self.comm, &self.decomposition, &mut self.particles, sides, region.periodic, reach)?;
-        self.candidates = region.candidates(&self.particles);
-        self.reference.reset(&self.particles);
         let mut strips = self.cut(0..inner);
         let inner_strips = strips.len();
         strips.extend(self.cut(inner..self.particles.owned));
+        self.candidates = region.candidates(&self.particles, &strips);
+        self.reference.reset(&self.particles);
         self.model.lists.start(&mut self.contacts, &self.particles, &mut self.candidates, strips, inner_strips);
         self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0 };
         self.rebuild_contacts()?;

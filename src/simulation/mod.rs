@@ -9,6 +9,7 @@ mod snapshot;
 mod strips;
 mod timers;
 mod traffic;
+mod workers;
 
 pub use report::Report;
 pub use timers::{STAGES, Stage, Timers};
@@ -374,6 +375,9 @@ impl Simulation {
         let motion = self.step_motion(plan);
         let input = self.pass_input(&cell);
         let relaxed = self.is_quasi_static();
+        if self.contacts.strips.len() > 1 {
+            workers::keep_awake();
+        }
         let Self { comm, model, halo, particles, contacts, lines, reference, ghost_wraps, timers, .. } = self;
         let phase = Phase { passes: model.passes_in_force(relaxed), input };
         let (inner, strips) = (contacts.inner, contacts.strips.len());

@@ -1,5 +1,6 @@
 //! The contact passes and the motion of one step over the strips of the contact list.
 
+use super::workers;
 use crate::contact::ends::Reading;
 use crate::contact::list::{CHUNK, ContactList, Run, Strip};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
@@ -148,7 +149,7 @@ impl Phase<'_> {
                 lines.split_at_mut((high.strips[0].kept.start - first_line) * self.input.stride);
             let (low_runs, high_runs) = runs.split_at(low.strips.len() * per_strip);
             let (low_rings, high_rings) = rings.split_at_mut(low.strips.len());
-            let (a, b) = rayon::join(
+            let (a, b) = workers::join(
                 || self.kept_strips(low, (low_rings, low_lines), low_runs, wanted.clone(), per_strip, bodies),
                 || self.kept_strips(high, (high_rings, high_lines), high_runs, wanted.clone(), per_strip, bodies),
             );
@@ -201,7 +202,7 @@ impl Phase<'_> {
             let (low, high) = work.split();
             let (low_slice, high_slice) = slice.split(high.strips[0].particles.start - low.strips[0].particles.start);
             let (low_rings, high_rings) = rings.split_at_mut(low.strips.len());
-            let (mut a, b) = rayon::join(
+            let (mut a, b) = workers::join(
                 || self.near_strips(low, low_slice, low_rings, view, motion),
                 || self.near_strips(high, high_slice, high_rings, view, motion),
             );
@@ -272,7 +273,7 @@ impl Phase<'_> {
             let (low, high) = runs.split_at(runs.len() / 2);
             let cut = (high[0].line - first_line) as usize;
             let (low_forces, high_forces) = forces.split_at_mut(cut.min(forces.len()));
-            let (mut a, b) = rayon::join(
+            let (mut a, b) = workers::join(
                 || self.observe_runs(low, list, bodies, owned, wanted, low_forces),
                 || self.observe_runs(high, list, bodies, owned, wanted, high_forces),
             );
