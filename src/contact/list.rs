@@ -1,7 +1,7 @@
 //! The list of contacts that touch or nearly do, and for every particle its contacts in the order of
 //! summation.
 //!
-//! The owned particles of a rank are cut into strips: runs of consecutive local indices, one per thread. A
+//! The owned particles of a rank are cut into strips: runs of consecutive local indices, one or two per thread. A
 //! contact belongs to the strip of its owner: the particle with the lower local index, or either of them if they are in
 //! different strips. Within a strip the step goes chunk by chunk: contacts owned by the chunk's particles, then sum and motion of these
 //! particles, whose contacts are then complete. So the output lines of contacts within the strip are
