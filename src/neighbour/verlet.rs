@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn strips_share_the_pairs_between_them_and_none_is_lost_or_doubled() {
-        let (pairs, _) = listed(&[0..384]);
+        let (pairs, _) = listed(std::slice::from_ref(&(0..384)));
         // Three per owned particle, and the 64 from the ghosts to the owned ones above them.
         assert_eq!(pairs.len(), 3 * 384 + 64);
         let (same, owned) = listed(&[0..192, 192..384]);
