@@ -21,6 +21,15 @@ fn copies_have_the_same_bits_over_ranks() {
     assert_eq!(outcome("thin", 8, &thin), reference, "boxes thinner than the reach");
 }
 
+#[test]
+fn tiles_of_layers_that_are_too_large_for_the_cache_have_the_same_bits() {
+    // 300,000 particles, about 6900 in a layer (`neighbour/tiles.rs`): one thread goes through two tiles. Two ranks have
+    // layers of 3500 and no tiles.
+    let extra = ["--set", "packing.random_close.replicate=[14, 14, 14]", "--set", "stage.0.until_strain={z=0.0002}"];
+    let reference = outcome("tiles", 1, &extra);
+    assert_eq!(outcome("no_tiles", 2, &extra), reference);
+}
+
 /// A column of the first row of a history.
 fn first(history: &[u8], column: &str) -> f64 {
     let text = String::from_utf8_lossy(history).into_owned();

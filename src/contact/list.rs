@@ -1,12 +1,13 @@
 //! The list of contacts that touch or nearly do, and for every particle its contacts in the order of
 //! summation.
 //!
-//! The owned particles of a rank are cut into strips: runs of consecutive local indices, one or two per thread. A
-//! contact belongs to the strip of its owner: the particle with the lower local index, or either of them if they are
-//! in different strips. Within a strip the step goes chunk by chunk: contacts owned by the chunk's particles, then sum
-//! and motion of these particles, whose contacts are then complete. So the output lines of contacts within the strip
-//! are needed for a short while only and live in a ring buffer; those of all other contacts are kept for the step, and
-//! copied behind the ring for the chunk whose sums read them, which so find every line in one buffer.
+//! The owned particles of a rank are cut into strips: runs of consecutive local indices, tiles of space
+//! ([`crate::neighbour::tiles`]), at least one per thread. A contact belongs to the strip of its owner: the particle with
+//! the lower local index, or either of them if they are in different strips. Within a strip the step goes chunk by chunk:
+//! contacts owned by the chunk's particles, then sum and motion of these particles, whose contacts are then complete. So
+//! the output lines of contacts within the strip are needed for a short while only and live in a ring buffer; those of
+//! all other contacts are kept for the step, and copied behind the ring for the chunk whose sums read them, which so
+//! find every line in one buffer.
 
 use super::ends::{End, Reading};
 use super::section::{BLOCK, PARTNERS, Partners, Section};

@@ -1,5 +1,6 @@
-//! Which pairs can touch before the next rebuild: linked cells and the Verlet list. Knows positions
-//! and radii only.
+//! Which pairs can touch before the next rebuild: linked cells and the Verlet list; and the order of particles in memory.
+//! Knows positions and radii only.
 
 pub mod cells;
+pub mod tiles;
 pub mod verlet;

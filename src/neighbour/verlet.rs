@@ -91,14 +91,10 @@ impl Region {
         points
     }
 
-    /// Local order of the owned particles that keeps neighbours in space near in memory.
+    /// How far the centres of listed pairs can be apart \[m\].
     #[must_use]
-    pub fn spatial_order(&self, particles: &Particles) -> Vec<u32> {
-        let positions: Vec<[f64; 3]> = particles.record[..particles.owned].iter().map(|r| r.position).collect();
-        if positions.is_empty() {
-            return Vec::new();
-        }
-        Bins::new(self.low, self.high, 2.0 * self.max_radius + self.skin, &positions).order().to_vec()
+    pub fn reach(&self) -> f64 {
+        2.0 * self.max_radius + self.skin
     }
 
     /// The Verlet list of this rank: every pair with at least one owned particle, once. Pairs of two
@@ -112,7 +108,7 @@ impl Region {
             return candidates;
         }
         let points = self.points(particles);
-        let reach = 2.0 * self.max_radius + self.skin;
+        let reach = self.reach();
         let low = [0, 1, 2].map(|k| self.low[k] - reach);
         let high = [0, 1, 2].map(|k| self.high[k] + reach);
         let bins = Bins::new(low, high, reach, &points.position);

@@ -5,9 +5,9 @@ use super::{Model, Simulation, Stage};
 use crate::contact::ends::MAX_LINES;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
+use crate::neighbour::tiles;
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
-use std::ops::Range;
 
 /// Skin of the contact list as a fraction of the largest diameter.
 const INNER_SKIN: f64 = 0.005;
@@ -123,15 +123,18 @@ impl Simulation {
         // Particles that other ranks see come last, each part in order of space.
         let seen =
             HaloPlan::seen_elsewhere(&self.comm, &self.decomposition, &self.particles, sides, region.periodic, reach);
-        let mut order = region.spatial_order(&self.particles);
-        order.sort_by_key(|particle| seen[*particle as usize]);
-        let inner = seen.iter().filter(|seen| !**seen).count();
+        let (mut order, mut border): (Vec<u32>, Vec<u32>) =
+            (0..self.particles.owned as u32).partition(|particle| !seen[*particle as usize]);
+        let inner = order.len();
+        let mut strips = tiles::arrange(&self.particles.record, &mut order, self.parts(inner), region.reach());
+        let inner_strips = strips.len();
+        let parts = self.parts(border.len());
+        let outer = tiles::arrange(&self.particles.record, &mut border, parts, region.reach());
+        strips.extend(outer.into_iter().map(|strip| strip.start + inner..strip.end + inner));
+        order.append(&mut border);
         self.particles.reorder(&order);
         self.halo =
             HaloPlan::build(&self.comm, &self.decomposition, &mut self.particles, sides, region.periodic, reach)?;
-        let mut strips = self.cut(0..inner);
-        let inner_strips = strips.len();
-        strips.extend(self.cut(inner..self.particles.owned));
         self.candidates = region.candidates(&self.particles, &strips);
         self.reference.reset(&self.particles);
         self.model.lists.start(&mut self.contacts, &self.particles, &mut self.candidates, strips, inner_strips);
@@ -141,18 +144,15 @@ impl Simulation {
         Ok(())
     }
 
-    /// Equal parts of a range of particles, one or two per thread if that pays.
-    fn cut(&self, particles: Range<usize>) -> Vec<Range<usize>> {
-        let count = particles.len();
-        let parts = match (self.threads, count / self.threads) {
+    /// Parts for so many particles, one or two per thread if that pays.
+    fn parts(&self, count: usize) -> usize {
+        match (self.threads, count / self.threads) {
             (1, _) | (_, ..MIN_PARTICLES_PER_STRIP) => 1,
             (threads, particles) if (2 * MIN_PARTICLES_PER_STRIP..FEW_PARTICLES_PER_THREAD).contains(&particles) => {
                 2 * threads
             }
             (threads, _) => threads,
-        };
-        let bound = |part: usize| particles.start + count * part / parts;
-        (0..parts).map(|part| bound(part)..bound(part + 1)).filter(|range| !range.is_empty()).collect()
+        }
     }
 
     fn rebuild_contacts(&mut self) -> Result<()> {
