@@ -52,7 +52,7 @@ figures-wahn2022: build
 
 lint: setup
 	@$(ENVIRONMENT) cargo fmt --check
-	@$(ENVIRONMENT) cargo clippy --all-targets $(CARGO_FLAGS) -- -D warnings
+	@$(ENVIRONMENT) cargo clippy --release --all-targets $(CARGO_FLAGS) -- -D warnings
 	@$(ENVIRONMENT) cargo test --release $(CARGO_FLAGS) --quiet --test architecture
 	@for script in scripts/*.sh jobscripts/*.sh .ci/run; do bash -n "$$script"; done
 	@if command -v shellcheck >/dev/null; then shellcheck -x scripts/*.sh jobscripts/*.sh .ci/run; fi

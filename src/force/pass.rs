@@ -312,8 +312,7 @@ impl<C: ContactLaw> LawPass<C> {
             } else {
                 laws.wall::<false>(&pair, memory, lane, rows);
             }
-            let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
-            excess = excess.or_else(|| first_excess(pair.touching, overlap, radius, input.max_overlap_fraction, place));
+            excess = excess.or_else(|| excess_of(&pair, input.max_overlap_fraction, place));
         }
         excess
     }
@@ -393,17 +392,12 @@ impl<C: ContactLaw> LawPass<C> {
     }
 }
 
-/// The first lane that overlaps too much or is not a number.
-#[cold]
-fn first_excess<L: Lane>(touching: L::Mask, overlap: L, radius: L, limit: f64, place: usize) -> Excess {
-    let (mut overlaps, mut radii) = ([0.0; BLOCK], [0.0; BLOCK]);
-    overlap.store(&mut overlaps);
-    radius.store(&mut radii);
-    let beyond = |lane: &usize| {
-        let within = overlaps[*lane] <= limit * radii[*lane];
-        L::lane(touching, *lane) && !within
-    };
-    (0..L::WIDTH).find(beyond).map(|lane| (place + lane, overlaps[lane] / radii[lane]))
+/// Whether a contact overlaps too much or is not a number.
+fn excess_of(pair: &PairTouch<f64>, limit: f64, place: usize) -> Excess {
+    let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
+    // Written so that NaN counts as a fault.
+    let within = overlap <= limit * radius;
+    (pair.touching && !within).then_some((place, overlap / radius))
 }
 
 #[cfg(test)]

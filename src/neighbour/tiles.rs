@@ -128,7 +128,7 @@ mod tests {
             let mut sites = [10; 3];
             sites[axis] = 40;
             let (records, runs) = arranged(sites, 1);
-            assert_eq!(runs, [0..4000]);
+            assert_eq!(runs, std::slice::from_ref(&(0..4000)));
             // Layers are as thick as the reach or a little more.
             assert!(records.windows(2).all(|pair| pair[0].position[axis] <= pair[1].position[axis] + 1.0));
         }

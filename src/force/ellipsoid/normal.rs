@@ -304,21 +304,29 @@ impl<L: Lane> Found<L> {
     #[inline(always)]
     fn settled(&self, step: &Step<L>) -> Self {
         let half = L::splat(0.5);
-        let on_surface = |along: [L; 2]| add(scale(self.tangents[0], along[0]), scale(self.tangents[1], along[1]));
         let [x, y] = step.along;
         let [first, second] = [self.radii[0], self.radii[1]];
-        let turned = add(self.normal, on_surface(step.along));
+        let turned = add(self.normal, self.on_surface(step.along));
         Self {
             // One step of Newton's for the length, which is 1 but for rounding.
             normal: scale(turned, L::splat(1.5) - half * dot(turned, turned)),
             overlap: self.overlap - half * step.gain,
-            first_point: add(self.first_point, on_surface([first[0] * x + first[2] * y, first[2] * x + first[1] * y])),
+            first_point: add(
+                self.first_point,
+                self.on_surface([first[0] * x + first[2] * y, first[2] * x + first[1] * y]),
+            ),
             second_point: sub(
                 self.second_point,
-                on_surface([second[0] * x + second[2] * y, second[2] * x + second[1] * y]),
+                self.on_surface([second[0] * x + second[2] * y, second[2] * x + second[1] * y]),
             ),
             ..*self
         }
+    }
+
+    /// From its components along the tangents to a vector.
+    #[inline(always)]
+    fn on_surface(&self, along: [L; 2]) -> Vector<L> {
+        add(scale(self.tangents[0], along[0]), scale(self.tangents[1], along[1]))
     }
 
     /// Lane by lane `yes` or `no`.

@@ -1,7 +1,7 @@
 //! The loop around the laws where there are ellipsoids: geometry a block at a time, then the law, then lines
 //! with both torques.
 
-use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, PassInput, RECORDS_AHEAD, first_excess};
+use super::{BodyData, Excess, Job, LEDGER_STRIDE, LawPass, PassInput, RECORDS_AHEAD, excess_of};
 use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::force::composition::MAX_MEMORY;
 use crate::force::ellipsoid::touch::{self, EllipsoidTouch, Surroundings, TouchBlock};
@@ -84,8 +84,7 @@ impl<C: ContactLaw> LawPass<C> {
                 // Written so that NaN counts as a fault.
                 let within = (limit * pair.min_radius).at_least(pair.touch.overlap);
                 if excess.is_none() && L::any(pair.touching & !within) {
-                    let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
-                    excess = first_excess(pair.touching, overlap, radius, input.max_overlap_fraction, place);
+                    excess = first_excess(&touches, input.max_overlap_fraction, block * BLOCK);
                 }
             }
         }
@@ -102,9 +101,7 @@ impl<C: ContactLaw> LawPass<C> {
             let touch = wall_touch(input, bodies, section, place);
             let memory = &mut section.memory[start..start + section.columns];
             self.ellipsoid_contacts(input, &touch, memory, place % BLOCK, rows, true);
-            let pair = &touch.pair;
-            let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
-            excess = excess.or_else(|| first_excess(pair.touching, overlap, radius, input.max_overlap_fraction, place));
+            excess = excess.or_else(|| excess_of(&touch.pair, input.max_overlap_fraction, place));
         }
         excess
     }
@@ -205,6 +202,12 @@ impl<C: ContactLaw> LawPass<C> {
         let wall = (section.partners == Partners::Wall).then(|| section.second[place]);
         observed.touch(section.first_of(place), pair, &response, virials, wall);
     }
+}
+
+/// The first contact of a block that overlaps too much or is not a number; `place` is the block's first.
+#[cold]
+fn first_excess(touches: &TouchBlock, limit: f64, place: usize) -> Excess {
+    (0..BLOCK).find_map(|lane| excess_of(&touches.load::<f64>(lane).pair, limit, place + lane))
 }
 
 /// A vector where `mask` holds, 0 elsewhere.

@@ -9,7 +9,6 @@ use crate::force::lane::{Lane, add, cross, dot, for_each_group, scale, sub};
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{ContactLaw, ContactResponse, MAX_EARLY};
 use crate::force::touches::{BlockTouches, LawTouch};
-use std::ops::Range;
 
 /// A law in the loop over the touches of some blocks.
 pub(super) struct Laws<'a, C> {
@@ -43,7 +42,8 @@ impl<C: ContactLaw> Laws<'_, C> {
         self.blocks::<F64x8, LEDGER>(touches, memory, lines);
     }
 
-    /// Law and output of some blocks.
+    /// Law and output of some blocks. No closure here holds what works on lanes: the compiler does not always fit one into
+    /// a function for vector instructions, and outside each of these would be a call (`tests/vector_code.rs`).
     #[inline(always)]
     pub fn blocks<L: Lane, const LEDGER: bool>(
         &self,
@@ -51,16 +51,20 @@ impl<C: ContactLaw> Laws<'_, C> {
         memory: &mut [CacheLine],
         lines: &mut LineRing,
     ) {
+        let zero = L::splat(0.0);
         let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
         for (block, touches) in touches.iter_mut().enumerate() {
             for_each_group!(L, lane, {
                 let pair = touches.touch::<L>(lane);
-                let normal = with_memory(&mut memory[of(block)], 0..C::NORMAL_MEMORY, lane, pair.alive, |memory| {
-                    self.law.normal(&pair.touch, memory)
-                });
+                let own = &mut memory[of(block)][..C::NORMAL_MEMORY];
+                let mut values = [zero; MAX_MEMORY];
+                let values = &mut values[..C::NORMAL_MEMORY];
+                load(values, own, lane);
+                let normal = self.law.normal(&pair.touch, values);
+                keep(values, own, lane, pair.alive);
                 touches.put_normal(lane, &normal, LEDGER);
                 if C::EARLY > 0 {
-                    let (mut values, mut early) = ([L::splat(0.0); MAX_MEMORY], [L::splat(0.0); MAX_EARLY]);
+                    let (mut values, mut early) = ([zero; MAX_MEMORY], [zero; MAX_EARLY]);
                     let rest = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
                     load(rest, &memory[of(block)][C::NORMAL_MEMORY..], lane);
                     self.law.early(&pair.touch, &normal, rest, &mut early[..C::EARLY]);
@@ -74,12 +78,14 @@ impl<C: ContactLaw> Laws<'_, C> {
             for_each_group!(L, lane, {
                 let rows = &mut rows[lane * self.stride..];
                 let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
-                let mut early = [L::splat(0.0); MAX_EARLY];
+                let mut early = [zero; MAX_EARLY];
                 touches.early(lane, &mut early[..C::EARLY]);
-                let rest = C::NORMAL_MEMORY..C::MEMORY;
-                let response = with_memory(&mut memory[of(block)], rest, lane, pair.alive, |memory| {
-                    self.law.complete(&pair.touch, &normal, &early[..C::EARLY], memory)
-                });
+                let rest = &mut memory[of(block)][C::NORMAL_MEMORY..C::MEMORY];
+                let mut values = [zero; MAX_MEMORY];
+                let values = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
+                load(values, rest, lane);
+                let response = self.law.complete(&pair.touch, &normal, &early[..C::EARLY], values);
+                keep(values, rest, lane, pair.alive);
                 self.write::<L, LEDGER>(&pair, &response, rows, false);
             });
         }
@@ -94,8 +100,11 @@ impl<C: ContactLaw> Laws<'_, C> {
         rows: &mut [f64],
     ) {
         let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
-        let response =
-            with_memory(memory, 0..C::MEMORY, lane, pair.alive, |memory| self.law.evaluate(&pair.touch, memory));
+        let mut values = [0.0; MAX_MEMORY];
+        let values = &mut values[..C::MEMORY];
+        load(values, memory, lane);
+        let response = self.law.evaluate(&pair.touch, values);
+        keep(values, memory, lane, pair.alive);
         self.write::<f64, LEDGER>(&pair, &response, rows, true);
     }
 
@@ -148,23 +157,10 @@ fn load<L: Lane>(values: &mut [L], memory: &[CacheLine], lane: usize) {
     }
 }
 
-/// Let a law work on some memory columns of the lanes from `lane` on; those it is not asked for forget.
+/// Some memory columns of the lanes from `lane` on get these values; those whose law is not asked forget.
 #[inline(always)]
-fn with_memory<L: Lane, T>(
-    memory: &mut [CacheLine],
-    columns: Range<usize>,
-    lane: usize,
-    alive: L::Mask,
-    law: impl FnOnce(&mut [L]) -> T,
-) -> T {
-    let zero = L::splat(0.0);
-    let mut values = [zero; MAX_MEMORY];
-    let memory = &mut memory[columns];
-    let values = &mut values[..memory.len()];
-    load(values, memory, lane);
-    let response = law(values);
+fn keep<L: Lane>(values: &[L], memory: &mut [CacheLine], lane: usize, alive: L::Mask) {
     for (value, column) in values.iter().zip(memory) {
-        L::select(alive, *value, zero).store(&mut column.0[lane..]);
+        L::select(alive, *value, L::splat(0.0)).store(&mut column.0[lane..]);
     }
-    response
 }

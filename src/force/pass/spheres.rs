@@ -1,6 +1,6 @@
 //! The geometric stages of the contact pass between spheres: the bodies relative to each other, then the touch.
 
-use super::{Excess, PassInput, RECORDS_AHEAD, first_excess};
+use super::{Excess, PassInput, RECORDS_AHEAD, excess_of};
 use crate::contact::section::{BLOCK, Section};
 use crate::contact::shift;
 use crate::force::geometry::{self, Relative};
@@ -130,6 +130,6 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     (blocks.start * BLOCK..blocks.end * BLOCK).find_map(|place| {
         let pair = [&section.first[place..=place], &section.second[place..=place]];
         let pair = geometry::spheres::<f64>(records, pair, &section.shift[place..=place], motion);
-        first_excess(pair.touching, pair.touch.overlap, pair.min_radius, limit, place)
+        excess_of(&pair, limit, place)
     })
 }
