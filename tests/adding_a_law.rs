@@ -92,7 +92,7 @@ fn copy(from: &Path, to: &Path) {
 }
 
 /// A copy of the sources whose build takes the compiled dependencies of this one (with a cargo that knows no
-/// `build-dir` they are compiled anew) and optimises less, to save time.
+/// `build-dir` they are compiled anew) and does not optimise, to save time.
 fn copy_of_the_sources() -> PathBuf {
     let folder = scratch("repository");
     for name in COPIED {
@@ -101,7 +101,7 @@ fn copy_of_the_sources() -> PathBuf {
     let build = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("a folder in the build folder");
     let settings = format!(
         "[build]\nbuild-dir = {:?}\ntarget-dir = \"target\"\n[net]\noffline = true\n\
-         [profile.release.package.dem-mpi]\nopt-level = 1\ndebug = 0\n",
+         [profile.release.package.dem-mpi]\nopt-level = 0\ndebug = 0\n",
         build.display()
     );
     fs::create_dir_all(folder.join(".cargo")).expect("the folder can be made");
