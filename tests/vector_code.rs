@@ -1,5 +1,8 @@
 //! Vector instructions come to be only where the compiler fits what works on lanes into a function compiled for them.
-//! Outside each would be a call of its own, ten times slower and with the right results: a test must look at the program.
+//! Outside each would be a call of its own, ten times slower and with the right results: a test must look at the
+//! program, as the release profile makes it.
+
+#![cfg(all(target_arch = "x86_64", not(debug_assertions)))]
 
 use std::process::Command;
 
