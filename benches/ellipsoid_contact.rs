@@ -6,9 +6,10 @@ use dem_mpi::contact::section::{BLOCK, Partners, Section};
 use dem_mpi::contact::shift::{ShiftTable, encode};
 use dem_mpi::force::ellipsoid::normal::Ellipsoids;
 use dem_mpi::force::ellipsoid::shape_tensor;
-use dem_mpi::force::ellipsoid::touch::{Surroundings, TouchBlock};
+use dem_mpi::force::ellipsoid::touch::{BlockSource, Surroundings};
 use dem_mpi::force::geometry::CellMotion;
 use dem_mpi::force::simd::Simd;
+use dem_mpi::force::touches::BlockTouches;
 use dem_mpi::state::particles::Record;
 use dem_mpi::state::shape::Shape;
 use rand_chacha::ChaCha8Rng;
@@ -67,10 +68,11 @@ fn scene(aspect: f64) -> Scene {
 }
 
 impl Scene {
-    fn touches(&self, simd: Simd, motion: &CellMotion, block: usize) -> TouchBlock {
+    fn touches(&self, simd: Simd, motion: &CellMotion, block: usize) -> BlockTouches {
         let surroundings = Surroundings { motion, range: 0.0, simd };
-        let mut touches = TouchBlock::EMPTY;
-        touches.take(&surroundings, &self.records, &self.shapes, &self.section, block, 0);
+        let mut touches = BlockTouches::zeroed();
+        let Self { records, shapes, section, .. } = self;
+        BlockSource { surroundings: &surroundings, records, shapes, section, block, normals: 0 }.fill(&mut touches);
         touches
     }
 
@@ -108,7 +110,7 @@ impl Scene {
         for block in 0..PAIRS / BLOCK {
             let touches = self.touches(Simd::Scalar, motion, block);
             for lane in 0..BLOCK {
-                let normal = touches.load::<f64>(lane).pair.touch.normal;
+                let normal = touches.normals().map(|column| column.0[lane]);
                 self.section.write_memory(block * BLOCK + lane, &normal);
             }
         }

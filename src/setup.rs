@@ -11,7 +11,7 @@ use crate::exchange::{
     Communicator, Decomposition, ExactSum, MigrationSetting, agree, distribute, exact_sum, redistribute,
 };
 use crate::force::cautions::{self, Sizes};
-use crate::force::pass::{self, Bodies};
+use crate::force::pass::{Bodies, PairPass};
 use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
@@ -163,10 +163,10 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         Sizes { smallest, .. } if smallest == extremes.max_radius => Bodies::EqualSpheres,
         _ => Bodies::Spheres,
     };
-    let passes: Vec<_> = config.pairs.iter().map(|pair| pass::build(pair, bodies)).collect();
+    let passes: Vec<_> = config.pairs.iter().map(|pair| PairPass::new(pair, bodies)).collect();
     let static_passes = if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
         let damped = config.pairs.iter().map(|pair| artificially_damped(pair, config.quasi_static.restitution));
-        damped.map(|pair| pass::build(&pair, bodies)).collect()
+        damped.map(|pair| PairPass::new(&pair, bodies)).collect()
     } else {
         Vec::new()
     };

@@ -201,7 +201,7 @@ pub trait RollingLaw: Copy + Send + Sync + 'static {
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L>;
 }
 
-/// What a whole contact (normal, tangential, rolling) returns to the pass.
+/// What the normal and the tangential law of a contact return together.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactResponse<L: Lane> {
     /// The bodies press or pull on each other: false over a dent that is no longer reached.
@@ -210,15 +210,13 @@ pub struct ContactResponse<L: Lane> {
     pub normal_force: L,
     /// Tangential force on i \[N\].
     pub tangential_force: Vector<L>,
-    /// Moment on i beside the arm's \[N m\].
-    pub moment: Vector<L>,
     /// Tangent stiffness \[N/m\].
     pub stiffness: L,
     /// Sum of the parts' energies.
     pub energies: Energies<L>,
 }
 
-/// The complete law of a pair of materials, as the pass sees it. Implemented once, by
+/// Normal and tangential law of a pair of materials, as the pass sees them. Implemented once, by
 /// [`super::composition::Composition`].
 pub trait ContactLaw: Copy + Send + Sync + 'static {
     /// Number of memory columns.
@@ -227,8 +225,6 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     const NORMAL_MEMORY: usize;
     /// Has a tangential force (torques from the arm, spins needed).
     const TANGENTIAL: bool;
-    /// Has rolling or twisting moments.
-    const ROLLING: bool;
     /// See [`NormalLaw::LASTS`].
     const LASTS: bool;
     /// See [`TangentialLaw::EARLY`].
@@ -245,7 +241,7 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
     fn normal<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L>;
     /// See [`TangentialLaw::early`]; `memory` has the remaining entries.
     fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]);
-    /// The other laws' part and the whole response; `memory` has the remaining entries.
+    /// The rest of the tangential law and the whole response; `memory` has the remaining entries.
     fn complete<L: Lane>(
         &self,
         touch: &Touch<L>,
@@ -253,7 +249,7 @@ pub trait ContactLaw: Copy + Send + Sync + 'static {
         early: &[L],
         memory: &mut [L],
     ) -> ContactResponse<L>;
-    /// All parts of one touch; `memory` has `MEMORY` entries.
+    /// Both laws for one touch; `memory` has `MEMORY` entries.
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> ContactResponse<L> {
         let (own, rest) = memory.split_at_mut(Self::NORMAL_MEMORY);

@@ -1,9 +1,10 @@
 //! What an observing contact pass collects: exact sums for stress and energies, maxima, samples of
 //! single contacts. Sums are exact, so that no order of ranks, threads or lists shows in them.
 
-use super::geometry::PairTouch;
-use super::lane::{scale, sub};
-use super::law::{ContactResponse, Energies};
+use super::lane::{dot, scale, sub};
+use super::law::Energies;
+use super::touches::BlockTouches;
+use crate::contact::section::BLOCK;
 use crate::exchange::exact_sum::ExactSum;
 
 /// Names the places in [`Observation::sums`].
@@ -89,7 +90,7 @@ impl Observation {
     }
 
     /// Take in maxima.
-    pub fn raise(&mut self, stiffness: f64, overlap_ratio: f64) {
+    fn raise(&mut self, stiffness: f64, overlap_ratio: f64) {
         self.max_stiffness = self.max_stiffness.max(stiffness);
         self.max_overlap_ratio = self.max_overlap_ratio.max(overlap_ratio);
     }
@@ -159,33 +160,52 @@ impl Observed<'_> {
     /// Single contacts are wanted, not only maxima over them.
     #[must_use]
     pub fn single(&self) -> bool {
-        self.wanted.sums || self.wanted.samples
+        self.wanted.sums || self.wanted.samples || !self.forces.is_empty()
     }
 
-    /// The present contact does not touch.
-    pub fn no_touch(&mut self) {
-        if let Some(force) = self.forces.get_mut(self.line - self.first_line) {
-            *force = [0.0; 4];
+    /// Take in no more than the maxima of some blocks after the normal law.
+    pub fn take_maxima(&mut self, touches: &[BlockTouches]) {
+        let (mut stiffness, mut ratio) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for touches in touches {
+            touches.raise(&mut stiffness, &mut ratio);
+        }
+        for lane in 0..BLOCK {
+            self.observation.raise(stiffness[lane], ratio[lane]);
         }
     }
 
-    /// Take in the present contact; `first` is the local index of its first particle, `virials` as in [`Sample`].
-    pub fn touch(
+    /// Take in the present contact, in this lane of a block; `first` is the local index of its first particle.
+    /// `ellipsoids`: there are some; `lasts`: the normal law's memory outlives the contact.
+    pub fn take(
         &mut self,
+        touches: &BlockTouches,
+        lane: usize,
         first: usize,
-        pair: &PairTouch<f64>,
-        response: &ContactResponse<f64>,
-        virials: [f64; 2],
         wall: Option<u32>,
+        (ellipsoids, lasts): (bool, bool),
     ) {
-        let touch = &pair.touch;
+        let response = touches.response::<f64>(lane);
+        if !touches.alive::<f64>(lane) || lasts && !response.joined {
+            if let Some(force) = self.forces.get_mut(self.line - self.first_line) {
+                *force = [0.0; 4];
+            }
+            return;
+        }
+        self.observation.raise(response.stiffness, touches.overlap_ratio(lane));
+        let touch = touches.touch::<f64, true>(lane);
         let force = sub(response.tangential_force, scale(touch.normal, response.normal_force));
         if let Some(place) = self.forces.get_mut(self.line - self.first_line) {
             *place = [force[0], force[1], force[2], 1.0];
         }
+        let virials = if ellipsoids {
+            let [one, other] = touches.arm_vectors(lane);
+            [-dot(one, force), dot(other, force)]
+        } else {
+            touches.arms::<f64>(lane, false).map(|arm| arm * response.normal_force)
+        };
         let sample = Sample {
             line: self.line,
-            branch: pair.branch,
+            branch: touches.branch(lane),
             normal: touch.normal,
             overlap: touch.overlap,
             force: scale(force, -1.0),
@@ -200,6 +220,5 @@ impl Observed<'_> {
         if self.wanted.samples {
             self.observation.samples.push(sample);
         }
-        self.observation.raise(response.stiffness, touch.overlap / pair.min_radius);
     }
 }

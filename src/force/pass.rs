@@ -1,26 +1,30 @@
-//! The loop around the laws, written once and monomorphised per composition and per width of the lanes:
-//! records in, one output line per contact out, memory updated in place.
+//! The contact pass: records in, one output line per contact out, memory updated in place. A batch of blocks goes
+//! through stages: geometry, normal law, rolling law, tangential law, output lines. Only the stages of normal and
+//! tangential law are compiled per composition.
 
-use super::composition::{self, MAX_MEMORY};
-use super::geometry::{self, CellMotion, PairTouch};
-use super::lane::{Lane, is_far, prefetch};
-#[cfg(target_arch = "x86_64")]
-use super::lane::{avx2::F64x4, avx512::F64x8};
-use super::law::{Column, ContactLaw, LawVisitor, Touch};
+use super::composition::{self, RollingVisitor};
+use super::geometry::{CellMotion, PairTouch};
+use super::lane::{is_far, prefetch};
+use super::law::{Column, ContactLaw, LawVisitor, RollingLaw, Touch};
 use super::observe::Observed;
 use super::simd::Simd;
 use super::touches::{BATCH, BlockTouches, Content};
 use crate::config::PairConfig;
-use crate::contact::section::{BLOCK, Partners, Section};
+use crate::contact::section::{BLOCK, CacheLine, Partners, Section};
 use crate::state::particles::Record;
 use crate::state::shape::Shape;
+use bytemuck::Zeroable;
 use std::ops::Range;
 
 mod ellipsoids;
 mod laws;
+mod output;
 mod spheres;
+mod walls;
 
-use laws::Laws;
+use laws::{LawBatch, LawStages, Rolling, RollingStage, Stages};
+pub use output::LineRing;
+use output::{LineForm, Output};
 
 /// Numbers at the end of an output line that the energy ledger takes.
 pub const LEDGER_STRIDE: usize = 8;
@@ -46,19 +50,6 @@ pub struct PassInput<'a> {
     pub time_step: f64,
     /// Instructions to use.
     pub simd: Simd,
-}
-
-/// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
-#[derive(Debug)]
-pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, 0, T, 0}`, F the force on the first, T the torque on each of two spheres of
-    /// equal radii; otherwise `{F, 0, T_first, 0, T_second, 0}`; then the ledger's
-    /// `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
-    pub values: &'a mut [f64],
-    /// Number of the first block's first line, a multiple of eight.
-    pub first: usize,
-    /// Capacity less one, all ones in binary; `usize::MAX` for a buffer that never wraps.
-    pub mask: usize,
 }
 
 /// Owned particles and ghosts as a pass reads them, from a section's origin on.
@@ -95,33 +86,21 @@ pub struct Job<'a> {
     pub touches: &'a mut [BlockTouches; BATCH],
 }
 
+/// Where the touches of some blocks come from.
+struct Source<'a> {
+    input: &'a PassInput<'a>,
+    /// Owned particles and ghosts from the section's origin on.
+    bodies: BodyData<'a>,
+    section: &'a Section,
+    /// Numbers of the blocks.
+    blocks: Range<usize>,
+    content: Content,
+    /// From which of the section's memory columns on the stored normals of ellipsoids are.
+    normals: usize,
+}
+
 /// A contact that overlaps too much or is not a number: its place in the section and overlap ratio.
 pub type Excess = Option<(usize, f64)>;
-
-/// The pass of one pair of materials.
-pub trait PairPass: Send + Sync {
-    /// Recompute what depends on the time step \[s\]; `relaxed`: in the limit of infinitely slow processes.
-    fn prepare(&mut self, time_step: f64, relaxed: bool);
-    /// Memory columns.
-    fn columns(&self) -> Vec<Column>;
-    /// Numbers per output line that this law needs.
-    fn stride(&self) -> usize;
-    /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
-    fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64;
-    /// Gap over the effective radius up to which contacts keep their memory; 0 if it ends with the touch.
-    fn range(&self) -> f64;
-    /// Evaluate some blocks of a section.
-    fn run(&self, job: Job) -> Excess;
-    /// Look at some blocks of a section without changing anything.
-    fn observe(
-        &self,
-        input: &PassInput,
-        bodies: BodyData,
-        section: &Section,
-        blocks: Range<usize>,
-        observed: &mut Observed,
-    );
-}
 
 /// What the particles of all ranks are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,53 +113,82 @@ pub enum Bodies {
     Ellipsoids,
 }
 
-struct LawPass<C> {
-    law: C,
-    bodies: Bodies,
-}
-
-struct Builder(Bodies);
-
-impl LawVisitor for Builder {
-    type Output = Box<dyn PairPass>;
-    fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
-        Box::new(LawPass { law, bodies: self.0 })
+impl Bodies {
+    /// The same bodies where it does not count that all radii are equal.
+    fn of_any_radius(self) -> Self {
+        if self == Self::EqualSpheres { Self::Spheres } else { self }
     }
 }
 
-/// The pass for a configured pair of materials.
-#[must_use]
-pub fn build(pair: &PairConfig, bodies: Bodies) -> Box<dyn PairPass> {
-    composition::visit(pair, Builder(bodies))
+/// The pass of one pair of materials.
+pub struct PairPass {
+    laws: Box<dyn LawStages>,
+    rolling: Option<Box<dyn RollingStage>>,
+    bodies: Bodies,
+    /// Memory columns of all laws.
+    columns: usize,
 }
 
-impl<C: ContactLaw> PairPass for LawPass<C> {
-    fn prepare(&mut self, time_step: f64, relaxed: bool) {
-        self.law.prepare(time_step);
-        if relaxed {
-            self.law.relax();
+struct BoxStages;
+
+impl LawVisitor for BoxStages {
+    type Output = Box<dyn LawStages>;
+    fn visit<C: ContactLaw>(self, law: C) -> Self::Output {
+        Box::new(Stages(law))
+    }
+}
+
+impl RollingVisitor for BoxStages {
+    type Output = Box<dyn RollingStage>;
+    fn visit<R: RollingLaw>(self, law: R) -> Self::Output {
+        Box::new(Rolling(law))
+    }
+}
+
+impl PairPass {
+    /// The pass for a configured pair of materials.
+    #[must_use]
+    pub fn new(pair: &PairConfig, bodies: Bodies) -> Self {
+        let laws = composition::visit(pair, BoxStages);
+        let rolling = composition::visit_rolling(pair, BoxStages);
+        let columns = laws.columns().len() + rolling.as_ref().map_or(0, |rolling| rolling.columns().len());
+        Self { laws, rolling, bodies, columns }
+    }
+
+    /// Recompute what depends on the time step \[s\]; `relaxed`: in the limit of infinitely slow processes.
+    pub fn prepare(&mut self, time_step: f64, relaxed: bool) {
+        self.laws.prepare(time_step, relaxed);
+        if let Some(rolling) = &mut self.rolling {
+            rolling.prepare(time_step);
         }
     }
 
-    fn columns(&self) -> Vec<Column> {
-        let mut columns = self.law.columns();
+    /// Memory columns.
+    #[must_use]
+    pub fn columns(&self) -> Vec<Column> {
+        let mut columns = self.laws.columns();
+        columns.extend(self.rolling.iter().flat_map(|rolling| rolling.columns()));
         if self.bodies == Bodies::Ellipsoids {
             columns.extend(ellipsoids::normal_columns());
         }
         columns
     }
 
-    fn stride(&self) -> usize {
-        match (self.bodies, C::TANGENTIAL) {
+    /// Numbers per output line that this law needs.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        match (self.bodies, self.laws.is_tangential()) {
             (Bodies::Ellipsoids, _) => 12,
-            _ if C::ROLLING => 12,
+            _ if self.rolling.is_some() => 12,
             (_, false) => 4,
             (Bodies::Spheres, true) => 12,
             (Bodies::EqualSpheres, true) => 8,
         }
     }
 
-    fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64 {
+    /// Tangent stiffness \[N/m\] of a fresh touch of this overlap and effective radius \[m\].
+    #[must_use]
+    pub fn reference_stiffness(&self, overlap: f64, effective_radius: f64) -> f64 {
         let touch = Touch {
             overlap,
             overlap_rate: 0.0,
@@ -194,210 +202,145 @@ impl<C: ContactLaw> PairPass for LawPass<C> {
             relative_spin: [0.0; 3],
             spin_about_normal: 0.0,
         };
-        let mut memory = [0.0; MAX_MEMORY];
-        self.law.evaluate(&touch, &mut memory[..C::MEMORY]).stiffness
+        let pair = PairTouch {
+            touching: true,
+            touch,
+            branch: [0.0, 0.0, 4.0 * effective_radius],
+            imposed_velocity: [0.0; 3],
+            arm_first: 2.0 * effective_radius,
+            arm_second: 2.0 * effective_radius,
+            min_radius: 2.0 * effective_radius,
+        };
+        let mut touches = BlockTouches::zeroed();
+        touches.put_none(0);
+        touches.put_any(0, &pair, 0.0);
+        let mut batch = LawBatch {
+            simd: Simd::Scalar,
+            detailed: true,
+            energies: false,
+            touches: std::slice::from_mut(&mut touches),
+            memory: &mut vec![CacheLine([0.0; BLOCK]); self.columns],
+            columns: self.columns,
+        };
+        self.laws.evaluate(&mut batch, None, None);
+        touches.response::<f64>(0).stiffness
     }
 
-    fn range(&self) -> f64 {
-        if C::LASTS { self.law.range() } else { 0.0 }
+    /// Gap over the effective radius up to which contacts keep their memory; 0 if it ends with the touch.
+    #[must_use]
+    pub fn range(&self) -> f64 {
+        self.laws.range()
     }
 
-    fn run(&self, job: Job) -> Excess {
-        if self.bodies == Bodies::Ellipsoids {
-            return self.run_ellipsoids(job);
-        }
-        if job.section.partners == Partners::Wall {
-            return self.walls(job);
-        }
-        let Job { input, bodies, section, blocks, mut lines, touches } = job;
-        let records = bodies.records;
-        let content = Content { rolling: C::ROLLING, ledger: input.ledger, range: self.range() };
-        let far = is_far(records);
-        let equal = self.bodies == Bodies::EqualSpheres;
-        if equal && let Some(record) = records.first() {
+    /// Evaluate some blocks of a section.
+    #[must_use]
+    pub fn run(&self, job: Job) -> Excess {
+        let Job { input, bodies, section, blocks, lines, touches } = job;
+        let (records, columns) = (bodies.records, section.columns);
+        let ellipsoids = self.bodies == Bodies::Ellipsoids;
+        let walls = section.partners == Partners::Wall;
+        let kind = if walls { self.bodies.of_any_radius() } else { self.bodies };
+        if kind == Bodies::EqualSpheres
+            && let Some(record) = records.first()
+        {
             touches.iter_mut().for_each(|touches| touches.put_radius(record.radius));
         }
-        let geometry = if equal { spheres::geometry::<true> } else { spheres::geometry::<false> };
+        if ellipsoids && !walls {
+            section.hints.resize(section.blocks(), [CacheLine([0.0; BLOCK]); 3]);
+        }
+        let detailed = input.ledger || ellipsoids;
+        let far = is_far(records);
+        let PassInput { stride, ledger, time_step, .. } = *input;
+        let rolling = self.rolling.is_some();
+        let content = Content { rolling, detailed, range: self.range() };
+        let form = LineForm { stride, ledger, time_step, bodies: kind, rolling, walls };
+        let mut output = Output { lines, form };
         let mut excess = None;
         for start in blocks.clone().step_by(BATCH) {
             let blocks = start..(start + BATCH).min(blocks.end);
             if far {
                 let ahead = start + LIST_AHEAD;
-                prefetch(&section.memory, ahead * C::MEMORY, BATCH * C::MEMORY);
+                prefetch(&section.memory, ahead * columns, BATCH * columns);
                 prefetch(&section.first, ahead * BLOCK, BATCH * BLOCK);
                 prefetch(&section.second, ahead * BLOCK, BATCH * BLOCK);
                 prefetch(&section.shift, ahead * BLOCK, BATCH * BLOCK);
             }
-            let found = geometry(input, records, section, blocks.clone(), content, touches);
+            let source = Source { input, bodies, section, blocks: blocks.clone(), content, normals: self.columns };
+            let found = geometry(&source, kind, touches);
             excess = excess.or(found);
-            let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step, equal };
-            let memory = &mut section.memory[blocks.start * C::MEMORY..blocks.end * C::MEMORY];
             let touches = &mut touches[..blocks.len()];
-            match (input.simd, input.ledger) {
-                // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
-                #[cfg(target_arch = "x86_64")]
-                (Simd::Avx512, false) => unsafe { laws.avx512::<false>(touches, memory, &mut lines) },
-                // SAFETY: as above.
-                #[cfg(target_arch = "x86_64")]
-                (Simd::Avx512, true) => unsafe { laws.avx512::<true>(touches, memory, &mut lines) },
-                // SAFETY: as above.
-                #[cfg(target_arch = "x86_64")]
-                (Simd::Avx2, false) => unsafe { laws.avx2::<false>(touches, memory, &mut lines) },
-                // SAFETY: as above.
-                #[cfg(target_arch = "x86_64")]
-                (Simd::Avx2, true) => unsafe { laws.avx2::<true>(touches, memory, &mut lines) },
-                (_, false) => laws.blocks::<f64, false>(touches, memory, &mut lines),
-                (_, true) => laws.blocks::<f64, true>(touches, memory, &mut lines),
+            let memory = &mut section.memory[blocks.start * columns..blocks.end * columns];
+            let mut batch = LawBatch { simd: input.simd, detailed, energies: ledger, touches, memory, columns };
+            self.laws.evaluate(&mut batch, self.rolling.as_deref(), Some(&mut output));
+            if detailed {
+                output.write(&mut batch, self.columns);
             }
-            lines.first += blocks.len() * BLOCK;
+            if ellipsoids && !walls {
+                for (hint, touches) in section.hints[blocks.clone()].iter_mut().zip(batch.touches.iter()) {
+                    *hint = touches.normals();
+                }
+            }
+            output.lines.first += blocks.len() * BLOCK;
         }
         excess
     }
 
-    fn observe(
+    /// Look at some blocks of a section without changing anything; gets room for touches and for a copy of their memory.
+    pub fn observe(
         &self,
         input: &PassInput,
         bodies: BodyData,
         section: &Section,
         blocks: Range<usize>,
+        (touches, memory): (&mut [BlockTouches; BATCH], &mut Vec<CacheLine>),
         observed: &mut Observed,
     ) {
-        if self.bodies == Bodies::Ellipsoids {
-            self.observe_ellipsoids(input, bodies, section, blocks, observed);
-            return;
-        }
-        let records = bodies.records;
-        if !observed.single() && section.partners != Partners::Wall {
-            let [stiffness, ratio] = match input.simd {
-                // SAFETY: as in `run`.
-                #[cfg(target_arch = "x86_64")]
-                Simd::Avx2 => unsafe { self.peaks_avx2(input, records, section, blocks) },
-                // SAFETY: as in `run`.
-                #[cfg(target_arch = "x86_64")]
-                Simd::Avx512 => unsafe { self.peaks_avx512(input, records, section, blocks) },
-                _ => self.peaks::<f64>(input, records, section, blocks),
-            };
-            observed.observation.raise(stiffness, ratio);
-            return;
-        }
+        let columns = section.columns;
+        let kind = self.bodies.of_any_radius();
+        let walls = section.partners == Partners::Wall;
+        let PassInput { stride, time_step, .. } = *input;
+        let rolling = self.rolling.is_some();
+        let content = Content { rolling, detailed: true, range: self.range() };
+        let form = LineForm { stride, ledger: false, time_step, bodies: kind, rolling, walls };
+        let nowhere = LineRing { values: &mut [], first: 0, mask: 0 };
+        let mut output = Output { lines: nowhere, form };
         let line = observed.line;
-        for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
-            observed.line = line + place - blocks.start * BLOCK;
-            self.observe_one(input, records, section, place, observed);
+        for start in blocks.clone().step_by(BATCH) {
+            let batch = start..(start + BATCH).min(blocks.end);
+            let source = Source { input, bodies, section, blocks: batch.clone(), content, normals: self.columns };
+            geometry(&source, kind, touches);
+            memory.clear();
+            memory.extend_from_slice(&section.memory[batch.start * columns..batch.end * columns]);
+            let touches = &mut touches[..batch.len()];
+            let (detailed, energies) = (true, observed.single());
+            let mut answered = LawBatch { simd: input.simd, detailed, energies, touches, memory, columns };
+            if !observed.single() {
+                // The normal law knows the stiffness.
+                self.laws.evaluate(&mut answered, None, None);
+                observed.take_maxima(answered.touches);
+                continue;
+            }
+            self.laws.evaluate(&mut answered, self.rolling.as_deref(), Some(&mut output));
+            for place in batch.start * BLOCK..(batch.end * BLOCK).min(section.count) {
+                observed.line = line + place - blocks.start * BLOCK;
+                let wall = walls.then(|| section.second[place]);
+                let touches = &answered.touches[place / BLOCK - batch.start];
+                let (first, lasts) = (section.first_of(place), self.laws.lasts());
+                observed.take(touches, place % BLOCK, first, wall, (kind == Bodies::Ellipsoids, lasts));
+            }
         }
     }
 }
 
-impl<C: ContactLaw> LawPass<C> {
-    /// Lanes whose law is asked.
-    #[inline(always)]
-    fn alive<L: Lane>(&self, pair: &PairTouch<L>) -> L::Mask {
-        pair.alive(if C::LASTS { self.law.range() } else { 0.0 })
+/// Touches of some blocks of such bodies.
+#[inline(always)]
+fn geometry(source: &Source, bodies: Bodies, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    match (source.section.partners, bodies) {
+        (Partners::Wall, _) => walls::geometry(source, touches),
+        (_, Bodies::Ellipsoids) => ellipsoids::geometry(source, touches),
+        (_, Bodies::EqualSpheres) => spheres::geometry::<true>(source, touches),
+        (_, Bodies::Spheres) => spheres::geometry::<false>(source, touches),
     }
-
-    fn walls(&self, job: Job) -> Excess {
-        let Job { input, bodies, section, blocks, lines, .. } = job;
-        let records = bodies.records;
-        let laws = Laws { law: &self.law, stride: input.stride, time_step: input.time_step, equal: false };
-        let mut excess = None;
-        for place in blocks.start * BLOCK..(blocks.end * BLOCK).min(section.count) {
-            let slot = (lines.first + place - blocks.start * BLOCK) & lines.mask;
-            let rows = &mut lines.values[slot * input.stride..(slot + 1) * input.stride];
-            let start = place / BLOCK * C::MEMORY;
-            let pair = geometry::wall(&records[section.first_of(place)], section.second[place], input.motion);
-            let memory = &mut section.memory[start..start + C::MEMORY];
-            let lane = place % BLOCK;
-            if input.ledger {
-                laws.wall::<true>(&pair, memory, lane, rows);
-            } else {
-                laws.wall::<false>(&pair, memory, lane, rows);
-            }
-            excess = excess.or_else(|| excess_of(&pair, input.max_overlap_fraction, place));
-        }
-        excess
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn peaks_avx2(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
-        self.peaks::<F64x4>(input, records, section, blocks)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512vl")]
-    fn peaks_avx512(&self, input: &PassInput, records: &[Record], section: &Section, blocks: Range<usize>) -> [f64; 2] {
-        self.peaks::<F64x8>(input, records, section, blocks)
-    }
-
-    /// Largest tangent stiffness and largest overlap over the smaller radius.
-    #[inline(always)]
-    fn peaks<L: Lane>(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &Section,
-        blocks: Range<usize>,
-    ) -> [f64; 2] {
-        let zero = L::splat(0.0);
-        let (mut stiffness, mut ratio) = (zero, zero);
-        for place in (blocks.start * BLOCK..blocks.end * BLOCK).step_by(L::WIDTH) {
-            let lanes = place..place + L::WIDTH;
-            let pairs = [&section.first[lanes.clone()], &section.second[lanes.clone()]];
-            let pair = geometry::spheres::<L>(records, pairs, &section.shift[lanes], input.motion);
-            let mut values = [zero; MAX_MEMORY];
-            let memory = &section.memory[place / BLOCK * C::MEMORY..(place / BLOCK + 1) * C::MEMORY];
-            for column in 0..C::MEMORY {
-                values[column] = L::load(&memory[column].0[place % BLOCK..]);
-            }
-            let response = self.law.evaluate(&pair.touch, &mut values[..C::MEMORY]);
-            stiffness = L::select(self.alive(&pair), response.stiffness, zero).max(stiffness);
-            ratio = L::select(pair.touching, pair.touch.overlap / pair.min_radius, zero).max(ratio);
-        }
-        let mut lanes = [0.0; 2 * BLOCK];
-        stiffness.store(&mut lanes);
-        ratio.store(&mut lanes[BLOCK..]);
-        let largest = |values: &[f64]| values.iter().fold(0.0, |m, v| if *v > m { *v } else { m });
-        [largest(&lanes[..BLOCK]), largest(&lanes[BLOCK..])]
-    }
-
-    fn observe_one(
-        &self,
-        input: &PassInput,
-        records: &[Record],
-        section: &Section,
-        place: usize,
-        observed: &mut Observed,
-    ) {
-        let first = &section.first[place..=place];
-        let wall = (section.partners == Partners::Wall).then(|| section.second[place]);
-        let pair = if let Some(wall) = wall {
-            geometry::wall(&records[section.first_of(place) - section.origin], wall, input.motion)
-        } else {
-            let pair = [first, &section.second[place..=place]];
-            geometry::spheres(records, pair, &section.shift[place..=place], input.motion)
-        };
-        if !self.alive(&pair) {
-            observed.no_touch();
-            return;
-        }
-        let mut memory = [0.0; MAX_MEMORY];
-        section.read_memory(place, &mut memory);
-        let response = self.law.evaluate(&pair.touch, &mut memory[..C::MEMORY]);
-        if C::LASTS && !response.joined {
-            observed.no_touch();
-            return;
-        }
-        let virials = [pair.arm_first * response.normal_force, pair.arm_second * response.normal_force];
-        observed.touch(section.first_of(place), &pair, &response, virials, wall);
-    }
-}
-
-/// Whether a contact overlaps too much or is not a number.
-fn excess_of(pair: &PairTouch<f64>, limit: f64, place: usize) -> Excess {
-    let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
-    // Written so that NaN counts as a fault.
-    let within = overlap <= limit * radius;
-    (pair.touching && !within).then_some((place, overlap / radius))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::{Model, Simulation, Stage};
 use crate::contact::ends::MAX_LINES;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
+use crate::force::pass::PairPass;
 use crate::neighbour::tiles;
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
@@ -43,7 +44,7 @@ impl Model {
     /// Largest gap over which a contact may keep its memory, with room for rounding \[m\]. No effective radius
     /// is above the largest radius.
     fn memory_reach(&self) -> f64 {
-        let range = self.passes.iter().map(|pass| pass.range()).fold(0.0, |m, r| if r > m { r } else { m });
+        let range = self.passes.iter().map(PairPass::range).fold(0.0, |m, r| if r > m { r } else { m });
         1.01 * range * self.max_radius
     }
 

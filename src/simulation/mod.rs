@@ -43,9 +43,9 @@ pub struct Model {
     /// Constants per species.
     pub species: Vec<SpeciesConstants>,
     /// One contact pass per pair of materials.
-    pub passes: Vec<Box<dyn PairPass>>,
+    pub passes: Vec<PairPass>,
     /// The same with the artificial damping of quasi-static stages; empty without such stages.
-    pub static_passes: Vec<Box<dyn PairPass>>,
+    pub static_passes: Vec<PairPass>,
     /// Stages and kinematics.
     pub programme: LoadProgramme,
     /// Bounds of the time step.
@@ -70,7 +70,7 @@ impl Model {
     /// Numbers per output line: the widest law's.
     #[must_use]
     pub fn stride(&self) -> usize {
-        self.passes.iter().map(|pass| pass.stride()).max().unwrap_or(4)
+        self.passes.iter().map(PairPass::stride).max().unwrap_or(4)
     }
 
     /// What of particles is followed beside their motion.
@@ -95,7 +95,7 @@ impl Model {
     /// Memory columns per pair of materials.
     #[must_use]
     pub fn columns(&self) -> Vec<Vec<Column>> {
-        self.passes.iter().map(|pass| pass.columns()).collect()
+        self.passes.iter().map(PairPass::columns).collect()
     }
 }
 

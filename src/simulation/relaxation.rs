@@ -36,7 +36,7 @@ impl Residuals {
 impl Model {
     /// The contact passes of the routine that runs.
     #[must_use]
-    pub fn passes_in_force(&self, quasi_static: bool) -> &[Box<dyn PairPass>] {
+    pub fn passes_in_force(&self, quasi_static: bool) -> &[PairPass] {
         if quasi_static { &self.static_passes } else { &self.passes }
     }
 }

@@ -71,7 +71,7 @@ pub struct PassFault {
 #[derive(Clone, Copy)]
 pub struct Phase<'a> {
     /// One pass per pair of materials.
-    pub passes: &'a [Box<dyn PairPass>],
+    pub passes: &'a [PairPass],
     /// For the passes.
     pub input: PassInput<'a>,
 }
@@ -288,11 +288,14 @@ impl Phase<'_> {
             forces,
             first_line: first_line as usize,
         };
+        let (mut touches, mut memory) = (bytemuck::zeroed_box(), Vec::new());
         for run in runs.iter().filter(|run| run.blocks > 0) {
             let section = &list.sections[run.section as usize];
             observed.line = run.line as usize;
             let blocks = run.block as usize..(run.block + run.blocks) as usize;
-            self.passes[section.pair].observe(&self.input, bodies.from(section.origin), section, blocks, &mut observed);
+            let bodies = bodies.from(section.origin);
+            let room = (&mut *touches, &mut memory);
+            self.passes[section.pair].observe(&self.input, bodies, section, blocks, room, &mut observed);
         }
         observed.observation
     }

@@ -1,6 +1,5 @@
 //! Touches where there are ellipsoids, a block at a time, from packed records and shapes; blocks of spheres alone
-//! need no search for the common normal. The block's numbers are laid down in
-//! between so that this code is compiled once per instruction set and not once per law.
+//! need no search for the common normal.
 
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, Found};
@@ -12,6 +11,7 @@ use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::Touch;
 use crate::force::simd::Simd;
+use crate::force::touches::BlockTouches;
 use crate::state::particles::Record;
 use crate::state::shape::{Shape, smallest_semi_axis};
 
@@ -38,89 +38,57 @@ pub struct Surroundings<'a> {
 /// Numbers of an [`EllipsoidTouch`].
 const NUMBERS: usize = 33;
 
-/// The touches of one block.
-#[derive(Debug, Clone)]
-#[repr(C, align(64))]
-pub struct TouchBlock([[f64; BLOCK]; NUMBERS]);
+/// Where the touches of a block come from.
+pub struct BlockSource<'a> {
+    /// What is the same for all.
+    pub surroundings: &'a Surroundings<'a>,
+    /// Records from the section's origin on.
+    pub records: &'a [Record],
+    /// Shapes likewise.
+    pub shapes: &'a [Shape],
+    /// The section.
+    pub section: &'a Section,
+    /// Number of the block.
+    pub block: usize,
+    /// From which of the section's memory columns on the stored normals are.
+    pub normals: usize,
+}
 
-impl TouchBlock {
-    /// No touches.
-    pub const EMPTY: Self = Self([[0.0; BLOCK]; NUMBERS]);
-
-    /// Take in the touches of a block of a section. `normals`: where in the section's memory columns the stored normal
-    /// is.
-    pub fn take(
-        &mut self,
-        surroundings: &Surroundings,
-        records: &[Record],
-        shapes: &[Shape],
-        section: &Section,
-        block: usize,
-        normals: usize,
-    ) {
-        let from = Source { surroundings, records, shapes, section, block, normals };
-        match surroundings.simd {
+impl BlockSource<'_> {
+    /// Put the touches of the block in place.
+    pub fn fill(&self, touches: &mut BlockTouches) {
+        match self.surroundings.simd {
             // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx512 => unsafe { self.fill_avx512(&from) },
+            Simd::Avx512 => unsafe { self.fill_avx512(touches) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Simd::Avx2 => unsafe { self.fill_avx2(&from) },
-            _ => self.fill::<f64>(&from),
+            Simd::Avx2 => unsafe { self.fill_avx2(touches) },
+            _ => self.fill_lanes::<f64>(touches),
         }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn fill_avx2(&mut self, from: &Source) {
-        self.fill::<F64x4>(from);
+    fn fill_avx2(&self, touches: &mut BlockTouches) {
+        self.fill_lanes::<F64x4>(touches);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl")]
-    fn fill_avx512(&mut self, from: &Source) {
-        self.fill::<F64x8>(from);
+    fn fill_avx512(&self, touches: &mut BlockTouches) {
+        self.fill_lanes::<F64x8>(touches);
     }
 
     #[inline(always)]
-    fn fill<L: Lane>(&mut self, from: &Source) {
+    fn fill_lanes<L: Lane>(&self, touches: &mut BlockTouches) {
         for lane in (0..BLOCK).step_by(L::WIDTH) {
-            let numbers = from.touch::<L>(lane).numbers();
-            for (column, number) in self.0.iter_mut().zip(numbers) {
-                number.store(&mut column[lane..]);
-            }
+            let touch = self.touch::<L>(lane);
+            touches.put_any(lane, &touch.pair, self.surroundings.range);
+            touches.put_arm_vectors(lane, &touch.arms);
         }
     }
 
-    /// The normals of the whole block.
-    #[must_use]
-    pub fn normals(&self) -> [CacheLine; 3] {
-        [CacheLine(self.0[8]), CacheLine(self.0[9]), CacheLine(self.0[10])]
-    }
-
-    /// The touches from a lane on.
-    #[inline(always)]
-    #[must_use]
-    pub fn load<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
-        let mut numbers = [L::splat(0.0); NUMBERS];
-        for (number, column) in numbers.iter_mut().zip(&self.0) {
-            *number = L::load(&column[lane..]);
-        }
-        EllipsoidTouch::from_numbers(numbers)
-    }
-}
-
-/// Where the touches of a block come from.
-struct Source<'a> {
-    surroundings: &'a Surroundings<'a>,
-    records: &'a [Record],
-    shapes: &'a [Shape],
-    section: &'a Section,
-    block: usize,
-    normals: usize,
-}
-
-impl Source<'_> {
     #[inline(always)]
     fn touch<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
         let place = self.block * BLOCK + lane;

@@ -1,151 +1,253 @@
-//! The laws' stages of the contact pass: the normal law of some blocks, then the other laws and the output lines.
+//! The laws' stages of the contact pass: the normal law of some blocks with the start of the tangential one, the rolling
+//! law, then the rest of the tangential one. Without details the last stage writes the output lines at once.
+//!
+//! No closure here holds what works on lanes: the compiler does not always fit one into a function for vector
+//! instructions, and outside each of these would be a call (`tests/vector_code.rs`).
 
-use super::{LEDGER_STRIDE, LineRing};
-use crate::contact::section::{BLOCK, CacheLine};
+use super::output::{Output, SphereLines};
+use crate::contact::section::CacheLine;
 use crate::force::composition::MAX_MEMORY;
-use crate::force::geometry::PairTouch;
-use crate::force::lane::{Lane, add, cross, dot, for_each_group, scale, sub};
+use crate::force::lane::{Lane, for_each_group};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
-use crate::force::law::{ContactLaw, ContactResponse, MAX_EARLY};
-use crate::force::touches::{BlockTouches, LawTouch};
+use crate::force::law::{Column, ContactLaw, MAX_EARLY, RollingLaw};
+use crate::force::simd::Simd;
+use crate::force::touches::BlockTouches;
 
-/// A law in the loop over the touches of some blocks.
-pub(super) struct Laws<'a, C> {
-    pub law: &'a C,
-    pub stride: usize,
-    pub time_step: f64,
-    /// All spheres have the same radius.
-    pub equal: bool,
+/// Some blocks between geometry and output.
+pub struct LawBatch<'a> {
+    /// Instructions to use.
+    pub simd: Simd,
+    /// Contacts may be elliptical, or more is wanted than lines between spheres.
+    pub detailed: bool,
+    /// Energies are wanted; only with details.
+    pub energies: bool,
+    /// Touches.
+    pub touches: &'a mut [BlockTouches],
+    /// Their memory, block by block.
+    pub memory: &'a mut [CacheLine],
+    /// Memory columns of a block: normal, tangential, rolling law, and what else a contact remembers.
+    pub columns: usize,
 }
 
-impl<C: ContactLaw> Laws<'_, C> {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    pub fn avx2<const LEDGER: bool>(
-        &self,
-        touches: &mut [BlockTouches],
-        memory: &mut [CacheLine],
-        lines: &mut LineRing,
-    ) {
-        self.blocks::<F64x4, LEDGER>(touches, memory, lines);
-    }
+/// The loops of a normal and a tangential law over some blocks.
+pub trait LawStages: Send + Sync {
+    /// Memory columns of both.
+    fn columns(&self) -> Vec<Column>;
+    /// There is a tangential law.
+    fn is_tangential(&self) -> bool;
+    /// The normal law's memory outlives the touch.
+    fn lasts(&self) -> bool;
+    /// Gap over the effective radius up to which the memory lasts, 0 if it ends with the touch.
+    fn range(&self) -> f64;
+    /// Recompute what depends on the time step \[s\]; `relaxed`: in the limit of infinitely slow processes.
+    fn prepare(&mut self, time_step: f64, relaxed: bool);
+    /// The normal law with the first part of the tangential one, the rolling law if there is one, and the rest. Without
+    /// details, in a batch of spheres, `output` gets the lines. No `output`: the normal law alone.
+    fn evaluate(&self, batch: &mut LawBatch, rolling: Option<&dyn RollingStage>, output: Option<&mut Output>);
+}
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx512f,avx512vl")]
-    pub fn avx512<const LEDGER: bool>(
-        &self,
-        touches: &mut [BlockTouches],
-        memory: &mut [CacheLine],
-        lines: &mut LineRing,
-    ) {
-        self.blocks::<F64x8, LEDGER>(touches, memory, lines);
-    }
+/// The loop of a rolling law over some blocks, between those of the others.
+pub trait RollingStage: Send + Sync {
+    /// Memory columns.
+    fn columns(&self) -> Vec<Column>;
+    /// Recompute what depends on the time step \[s\].
+    fn prepare(&mut self, time_step: f64);
+    /// The rolling law; its memory begins at column `first` of each block.
+    fn evaluate(&self, batch: &mut LawBatch, first: usize);
+}
 
-    /// Law and output of some blocks. No closure here holds what works on lanes: the compiler does not always fit one into
-    /// a function for vector instructions, and outside each of these would be a call (`tests/vector_code.rs`).
+/// A stage as a method that calls the loop compiled for the level and the details that the batch asks for.
+macro_rules! stage {
+    ($name:ident $avx2:ident $avx512:ident $lanes:ident ($($arg:ident: $type:ty),*)) => {
+        fn $name(&self, batch: &mut LawBatch, $($arg: $type),*) {
+            match (batch.simd, batch.detailed) {
+                // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx512, false) => unsafe { self.$avx512::<false>(batch, $($arg),*) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx512, true) => unsafe { self.$avx512::<true>(batch, $($arg),*) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx2, false) => unsafe { self.$avx2::<false>(batch, $($arg),*) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                (Simd::Avx2, true) => unsafe { self.$avx2::<true>(batch, $($arg),*) },
+                (_, false) => self.$lanes::<f64, false>(batch, $($arg),*),
+                (_, true) => self.$lanes::<f64, true>(batch, $($arg),*),
+            }
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $avx2<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
+            self.$lanes::<F64x4, DETAILED>(batch, $($arg),*);
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl")]
+        fn $avx512<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
+            self.$lanes::<F64x8, DETAILED>(batch, $($arg),*);
+        }
+    };
+}
+
+/// The stages of a composition.
+pub(super) struct Stages<C>(pub C);
+
+impl<C: ContactLaw> Stages<C> {
+    stage!(run avx2 avx512 lanes (rolling: Option<&dyn RollingStage>, output: Option<&mut Output>));
+
     #[inline(always)]
-    pub fn blocks<L: Lane, const LEDGER: bool>(
+    fn lanes<L: Lane, const DETAILED: bool>(
         &self,
-        touches: &mut [BlockTouches],
-        memory: &mut [CacheLine],
-        lines: &mut LineRing,
+        batch: &mut LawBatch,
+        rolling: Option<&dyn RollingStage>,
+        output: Option<&mut Output>,
     ) {
+        self.normal::<L, DETAILED>(batch);
+        if let Some(output) = output {
+            if let Some(rolling) = rolling {
+                rolling.evaluate(batch, C::MEMORY);
+            }
+            self.complete::<L, DETAILED>(batch, output);
+        }
+    }
+
+    #[inline(always)]
+    fn normal<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch) {
         let zero = L::splat(0.0);
-        let of = |block: usize| block * C::MEMORY..(block + 1) * C::MEMORY;
-        for (block, touches) in touches.iter_mut().enumerate() {
+        for (block, touches) in batch.touches.iter_mut().enumerate() {
+            let memory = &mut batch.memory[block * batch.columns..][..C::MEMORY];
+            let (own, rest) = memory.split_at_mut(C::NORMAL_MEMORY);
             for_each_group!(L, lane, {
-                let pair = touches.touch::<L>(lane);
-                let own = &mut memory[of(block)][..C::NORMAL_MEMORY];
-                let mut values = [zero; MAX_MEMORY];
-                let values = &mut values[..C::NORMAL_MEMORY];
-                load(values, own, lane);
-                let normal = self.law.normal(&pair.touch, values);
-                keep(values, own, lane, pair.alive);
-                touches.put_normal(lane, &normal, LEDGER);
-                if C::EARLY > 0 {
-                    let (mut values, mut early) = ([zero; MAX_MEMORY], [zero; MAX_EARLY]);
-                    let rest = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
-                    load(rest, &memory[of(block)][C::NORMAL_MEMORY..], lane);
-                    self.law.early(&pair.touch, &normal, rest, &mut early[..C::EARLY]);
-                    touches.put_early(lane, &early[..C::EARLY]);
+                let alive = touches.alive::<L>(lane);
+                if DETAILED && !L::any(alive) {
+                    forget::<L>(own, lane);
+                    forget::<L>(rest, lane);
+                } else {
+                    let touch = touches.touch::<L, DETAILED>(lane);
+                    let mut values = [zero; MAX_MEMORY];
+                    let values = &mut values[..C::NORMAL_MEMORY];
+                    load(values, own, lane);
+                    let normal = self.0.normal(&touch, values);
+                    keep(values, own, lane, alive);
+                    touches.put_normal::<L, DETAILED>(lane, &normal, batch.energies);
+                    if C::EARLY > 0 {
+                        let (mut values, mut early) = ([zero; MAX_MEMORY], [zero; MAX_EARLY]);
+                        let values = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
+                        load(values, rest, lane);
+                        self.0.early(&touch, &normal, values, &mut early[..C::EARLY]);
+                        touches.put_early(lane, &early[..C::EARLY]);
+                    }
                 }
             });
         }
-        for (block, touches) in touches.iter().enumerate() {
-            let slot = ((lines.first + block * BLOCK) & lines.mask) * self.stride;
-            let rows = &mut lines.values[slot..slot + BLOCK * self.stride];
+    }
+
+    #[inline(always)]
+    fn complete<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, output: &mut Output) {
+        let zero = L::splat(0.0);
+        let Output { lines, form } = output;
+        for (block, touches) in batch.touches.iter_mut().enumerate() {
+            let own = &mut batch.memory[block * batch.columns..][C::NORMAL_MEMORY..C::MEMORY];
+            let rows = if DETAILED { &mut [] } else { lines.block(block, form.stride) };
             for_each_group!(L, lane, {
-                let rows = &mut rows[lane * self.stride..];
-                let (pair, normal) = (touches.touch::<L>(lane), touches.normal(lane));
-                let mut early = [zero; MAX_EARLY];
-                touches.early(lane, &mut early[..C::EARLY]);
-                let rest = &mut memory[of(block)][C::NORMAL_MEMORY..C::MEMORY];
-                let mut values = [zero; MAX_MEMORY];
-                let values = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
-                load(values, rest, lane);
-                let response = self.law.complete(&pair.touch, &normal, &early[..C::EARLY], values);
-                keep(values, rest, lane, pair.alive);
-                self.write::<L, LEDGER>(&pair, &response, rows, false);
+                let alive = touches.alive::<L>(lane);
+                if !DETAILED || L::any(alive) {
+                    let (touch, normal) = (touches.touch::<L, DETAILED>(lane), touches.normal(lane));
+                    let mut early = [zero; MAX_EARLY];
+                    touches.early(lane, &mut early[..C::EARLY]);
+                    let mut values = [zero; MAX_MEMORY];
+                    let values = &mut values[..C::MEMORY - C::NORMAL_MEMORY];
+                    load(values, own, lane);
+                    let mut response = self.0.complete(&touch, &normal, &early[..C::EARLY], values);
+                    keep(values, own, lane, alive);
+                    if DETAILED {
+                        touches.put_tangential(lane, &response.tangential_force);
+                        if batch.energies {
+                            if form.rolling {
+                                response.energies = response.energies.plus(touches.rolling::<L>(lane).energies);
+                            }
+                            touches.put_energies(lane, &response.energies);
+                        }
+                    } else {
+                        let spheres = SphereLines {
+                            alive,
+                            normal: touch.normal,
+                            normal_force: response.normal_force,
+                            tangential_force: response.tangential_force,
+                        };
+                        form.write_spheres(&mut rows[lane * form.stride..], &spheres, touches, lane);
+                    }
+                }
             });
         }
     }
+}
 
-    /// Law and output of a wall contact.
-    pub fn wall<const LEDGER: bool>(
-        &self,
-        pair: &PairTouch<f64>,
-        memory: &mut [CacheLine],
-        lane: usize,
-        rows: &mut [f64],
-    ) {
-        let pair = LawTouch::new(pair, if C::LASTS { self.law.range() } else { 0.0 });
-        let mut values = [0.0; MAX_MEMORY];
-        let values = &mut values[..C::MEMORY];
-        load(values, memory, lane);
-        let response = self.law.evaluate(&pair.touch, values);
-        keep(values, memory, lane, pair.alive);
-        self.write::<f64, LEDGER>(&pair, &response, rows, true);
+impl<C: ContactLaw> LawStages for Stages<C> {
+    fn columns(&self) -> Vec<Column> {
+        self.0.columns()
     }
+    fn is_tangential(&self) -> bool {
+        C::TANGENTIAL
+    }
+    fn lasts(&self) -> bool {
+        C::LASTS
+    }
+    fn range(&self) -> f64 {
+        if C::LASTS { self.0.range() } else { 0.0 }
+    }
+    fn prepare(&mut self, time_step: f64, relaxed: bool) {
+        self.0.prepare(time_step);
+        if relaxed {
+            self.0.relax();
+        }
+    }
+    fn evaluate(&self, batch: &mut LawBatch, rolling: Option<&dyn RollingStage>, output: Option<&mut Output>) {
+        self.run(batch, rolling, output);
+    }
+}
 
-    /// Output of `L::WIDTH` contacts.
+/// The stage of a rolling law.
+pub(super) struct Rolling<R>(pub R);
+
+impl<R: RollingLaw> Rolling<R> {
+    stage!(run avx2 avx512 lanes (first: usize));
+
     #[inline(always)]
-    fn write<L: Lane, const LEDGER: bool>(
-        &self,
-        pair: &LawTouch<L>,
-        response: &ContactResponse<L>,
-        rows: &mut [f64],
-        wall: bool,
-    ) {
+    fn lanes<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, first: usize) {
+        const { assert!(R::MEMORY <= MAX_MEMORY, "a rolling law has more memory columns than the loop holds") };
         let zero = L::splat(0.0);
-        let kept = |value: L| L::select(pair.alive, value, zero);
-        // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
-        let tangential = response.tangential_force.map(kept);
-        let force = sub(tangential, scale(pair.touch.normal, kept(response.normal_force)));
-        let stride = self.stride;
-        L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
-        let own = if LEDGER { stride - LEDGER_STRIDE } else { stride };
-        if own >= 8 {
-            let turning = cross(pair.touch.normal, tangential);
-            let mut first = scale(turning, pair.arm_first);
-            let mut second = scale(turning, if self.equal { pair.arm_first } else { pair.arm_second });
-            if C::ROLLING {
-                let moment = response.moment.map(kept);
-                (first, second) = (add(first, moment), sub(second, moment));
-            }
-            L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
-            if own >= 12 {
-                L::scatter([second[0], second[1], second[2], zero], rows, stride, 8);
-            }
+        for (block, touches) in batch.touches.iter_mut().enumerate() {
+            let own = &mut batch.memory[block * batch.columns + first..][..R::MEMORY];
+            for_each_group!(L, lane, {
+                let (touch, normal) = (touches.touch::<L, DETAILED>(lane), touches.normal(lane));
+                let mut values = [zero; MAX_MEMORY];
+                let values = &mut values[..R::MEMORY];
+                load(values, own, lane);
+                let response = self.0.evaluate(&touch, &normal, values);
+                // The resistance ends with the contact circle, though the normal law's memory may go on. Written so that
+                // NaN counts as joined and is found.
+                let joined = zero.not_at_least(normal.contact_radius);
+                keep(values, own, lane, touches.alive::<L>(lane) & joined);
+                touches.put_rolling::<L, DETAILED>(lane, &response.only(joined));
+            });
         }
-        if LEDGER {
-            // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
-            let work = kept(dot(force, pair.imposed_velocity) * L::splat(self.time_step));
-            let (cell, driven) = if wall { (zero, work) } else { (work, zero) };
-            let e = &response.energies;
-            L::scatter([cell, driven, kept(e.damping), kept(e.viscous)], rows, stride, own);
-            L::scatter([kept(e.friction), kept(e.plastic), zero, zero], rows, stride, own + 4);
-        }
+    }
+}
+
+impl<R: RollingLaw> RollingStage for Rolling<R> {
+    fn columns(&self) -> Vec<Column> {
+        self.0.columns()
+    }
+    fn prepare(&mut self, time_step: f64) {
+        self.0.prepare(time_step);
+    }
+    fn evaluate(&self, batch: &mut LawBatch, first: usize) {
+        self.run(batch, first);
     }
 }
 
@@ -162,5 +264,13 @@ fn load<L: Lane>(values: &mut [L], memory: &[CacheLine], lane: usize) {
 fn keep<L: Lane>(values: &[L], memory: &mut [CacheLine], lane: usize, alive: L::Mask) {
     for (value, column) in values.iter().zip(memory) {
         L::select(alive, *value, L::splat(0.0)).store(&mut column.0[lane..]);
+    }
+}
+
+/// Some memory columns of the lanes from `lane` on forget.
+#[inline(always)]
+fn forget<L: Lane>(memory: &mut [CacheLine], lane: usize) {
+    for column in memory {
+        L::splat(0.0).store(&mut column.0[lane..]);
     }
 }

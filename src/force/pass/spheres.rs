@@ -1,73 +1,46 @@
 //! The geometric stages of the contact pass between spheres: the bodies relative to each other, then the touch.
 
-use super::{Excess, PassInput, RECORDS_AHEAD, excess_of};
-use crate::contact::section::{BLOCK, Section};
+use super::{BodyData, Excess, RECORDS_AHEAD, Source};
+use crate::contact::section::BLOCK;
 use crate::contact::shift;
 use crate::force::geometry::{self, Relative};
 use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
-use crate::force::touches::{BATCH, BlockTouches, Content};
-use crate::state::particles::{RECORD, Record};
-use std::ops::Range;
+use crate::force::touches::{BATCH, BlockTouches};
+use crate::state::particles::RECORD;
 
 /// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number. `EQUAL`: all
 /// spheres have the same radius, which the touches know ([`BlockTouches::put_radius`]).
-pub(super) fn geometry<const EQUAL: bool>(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    match input.simd {
+#[inline(always)]
+pub(super) fn geometry<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    match source.input.simd {
         // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512 => unsafe { geometry_avx512::<EQUAL>(input, records, section, blocks, content, touches) },
+        Simd::Avx512 => unsafe { geometry_avx512::<EQUAL>(source, touches) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2 => unsafe { geometry_avx2::<EQUAL>(input, records, section, blocks, content, touches) },
-        _ => geometry_of::<f64, EQUAL>(input, records, section, blocks, content, touches),
+        Simd::Avx2 => unsafe { geometry_avx2::<EQUAL>(source, touches) },
+        _ => geometry_of::<f64, EQUAL>(source, touches),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn geometry_avx2<const EQUAL: bool>(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    geometry_of::<F64x4, EQUAL>(input, records, section, blocks, content, touches)
+fn geometry_avx2<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    geometry_of::<F64x4, EQUAL>(source, touches)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl")]
-fn geometry_avx512<const EQUAL: bool>(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
-    geometry_of::<F64x8, EQUAL>(input, records, section, blocks, content, touches)
+fn geometry_avx512<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    geometry_of::<F64x8, EQUAL>(source, touches)
 }
 
 #[inline(always)]
-fn geometry_of<L: Lane, const EQUAL: bool>(
-    input: &PassInput,
-    records: &[Record],
-    section: &Section,
-    blocks: Range<usize>,
-    content: Content,
-    touches: &mut [BlockTouches; BATCH],
-) -> Excess {
+fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    let Source { input, bodies: BodyData { records, .. }, section, ref blocks, content, .. } = *source;
     let (first, second) = (section.first.as_chunks::<BLOCK>().0, section.second.as_chunks::<BLOCK>().0);
     let pairs = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
     let codes = &section.shift.as_chunks::<BLOCK>().0[blocks.clone()];
@@ -117,6 +90,9 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
                 pair.equal(radius);
             }
             pair.follow_cell(motion);
+            if content.detailed {
+                touches.put_details(lane, &pair.branch, &pair.imposed_velocity);
+            }
             let pair = geometry::touch(&pair, unequal);
             touches.put_touch::<L, EQUAL>(lane, &pair, content);
             // Written so that NaN counts as a fault.
@@ -130,6 +106,9 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     (blocks.start * BLOCK..blocks.end * BLOCK).find_map(|place| {
         let pair = [&section.first[place..=place], &section.second[place..=place]];
         let pair = geometry::spheres::<f64>(records, pair, &section.shift[place..=place], motion);
-        excess_of(&pair, limit, place)
+        let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
+        // Written so that NaN counts as a fault.
+        let within = overlap <= limit * radius;
+        (pair.touching && !within).then_some((place, overlap / radius))
     })
 }

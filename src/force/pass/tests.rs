@@ -1,5 +1,6 @@
 use super::*;
 use crate::contact::shift::{self, ShiftTable};
+use crate::force::observe::{Observation, Wanted};
 use crate::force::registry::Role;
 use crate::force::testing::{choice, pair, properties, pvdf};
 
@@ -22,9 +23,10 @@ fn records() -> Vec<Record> {
         .collect()
 }
 
-/// Bits of force and torque on the first of each pair and of its memory after some steps.
-fn run(config: &PairConfig, bodies: Bodies, simd: Simd) -> Vec<u64> {
-    let mut pass = build(config, bodies);
+/// Bits of force and torque on the first of each pair and of its memory after some steps; then, from two ways of looking,
+/// the largest stiffness.
+fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> (Vec<u64>, [f64; 2]) {
+    let mut pass = PairPass::new(config, bodies);
     let time_step = 1e-5;
     pass.prepare(time_step, false);
     let columns = pass.columns().len();
@@ -41,8 +43,8 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd) -> Vec<u64> {
         gradient: [0.0, 0.0, -0.5],
         wall_velocity: [0.0; 3],
     };
-    let stride = pass.stride();
-    let input = PassInput { motion: &motion, stride, ledger: false, max_overlap_fraction: 0.5, time_step, simd };
+    let stride = pass.stride() + if ledger { LEDGER_STRIDE } else { 0 };
+    let input = PassInput { motion: &motion, stride, ledger, max_overlap_fraction: 0.5, time_step, simd };
     let mut records = records();
     let mut lines = vec![0.0; section.blocks() * BLOCK * stride];
     let mut touches: Box<[BlockTouches; BATCH]> = bytemuck::zeroed_box();
@@ -64,11 +66,20 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd) -> Vec<u64> {
         section.read_memory(place, &mut memory);
         bits.extend(line[..3].iter().chain(&line[4..7]).chain(&memory).map(|value| value.to_bits()));
     }
-    bits
+    let looked = [false, true].map(|sums| {
+        let wanted = Wanted { sums, samples: false };
+        let observation = Observation::new(wanted);
+        let mut observed = Observed { wanted, owned: PAIRS, line: 0, observation, forces: &mut [], first_line: 0 };
+        let room = (&mut *touches, &mut Vec::new());
+        let bodies = BodyData { records: &records, shapes: &[] };
+        pass.observe(&input, bodies, &section, 0..section.blocks(), room, &mut observed);
+        observed.observation.max_stiffness
+    });
+    (bits, looked)
 }
 
 #[test]
-fn equal_radii_give_the_bits_of_any_radii_at_every_width() {
+fn equal_radii_and_a_ledger_change_no_bits_at_any_width() {
     let mindlin = Some(choice(Role::Tangential, "mindlin", &[]));
     let hertz = pair(properties(5e7, 0.25, Vec::new()), choice(Role::Normal, "hertz", &[]));
     let relaxing = pair(pvdf(), choice(Role::Normal, "maxwell_zener", &[]));
@@ -78,12 +89,16 @@ fn equal_radii_give_the_bits_of_any_radii_at_every_width() {
         PairConfig { tangential: mindlin.clone(), rolling, ..hertz },
         PairConfig { tangential: mindlin, ..relaxing },
     ] {
-        let expected = run(&config, Bodies::Spheres, Simd::Scalar);
+        let (expected, stiffness) = run(&config, Bodies::Spheres, Simd::Scalar, false);
+        assert!(stiffness[0] > 0.0 && stiffness[0] == stiffness[1], "{stiffness:?}");
         let touching = expected.iter().filter(|bits| **bits != 0.0_f64.to_bits()).count();
         assert!(touching > expected.len() / 3 && touching < expected.len(), "{touching} of {}", expected.len());
         for simd in [Simd::Scalar, Simd::Avx2, Simd::Avx512].into_iter().filter(|level| level.is_available()) {
             for bodies in [Bodies::Spheres, Bodies::EqualSpheres] {
-                assert!(run(&config, bodies, simd) == expected, "{bodies:?} {simd:?}");
+                for ledger in [false, true] {
+                    let same = run(&config, bodies, simd, ledger) == (expected.clone(), stiffness);
+                    assert!(same, "{bodies:?} {simd:?}, ledger {ledger}");
+                }
             }
         }
     }
