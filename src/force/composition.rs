@@ -88,8 +88,7 @@ impl<N: NormalLaw, T: TangentialLaw> ContactLaw for Composition<N, T> {
         memory: &mut [L],
     ) -> ContactResponse<L> {
         let mut tangential = self.tangential.complete(touch, normal, early, memory);
-        // Written so that NaN counts as joined and is found.
-        let joined = L::splat(0.0).not_at_least(normal.contact_radius);
+        let joined = normal.joined();
         if N::LASTS {
             // Friction ends with the contact circle, though the normal law's memory goes on.
             tangential = tangential.only(joined);

@@ -40,7 +40,7 @@ pub struct Touch<L> {
     pub spin_about_normal: L,
 }
 
-/// Energies of one touch that the observing pass sums (the plain pass leaves them to the
+/// Energies of one touch, for the ledger and for a look at the state (a pass that does not want them leaves them to the
 /// optimiser to delete). What is held is given as it is now, what is dissipated as this step's share.
 #[derive(Debug, Clone, Copy)]
 pub struct Energies<L> {
@@ -81,7 +81,8 @@ impl<L: Lane> Energies<L> {
     }
 }
 
-/// What a normal law returns.
+/// What a normal law returns. The tangential and the rolling law get force, contact radius and dashpot; the rest is NaN or
+/// without meaning to them.
 #[derive(Debug, Clone, Copy)]
 pub struct NormalResponse<L> {
     /// Normal force F_n \[N\], compression positive, after clipping.
@@ -94,6 +95,16 @@ pub struct NormalResponse<L> {
     pub dashpot: L,
     /// Energies of the normal part.
     pub energies: Energies<L>,
+}
+
+impl<L: Lane> NormalResponse<L> {
+    /// The bodies press or pull on each other: false over a dent that is no longer reached.
+    #[inline(always)]
+    #[must_use]
+    pub fn joined(&self) -> L::Mask {
+        // Written so that NaN counts as joined and is found.
+        L::splat(0.0).not_at_least(self.contact_radius)
+    }
 }
 
 /// What a tangential or rolling law returns.
@@ -204,7 +215,7 @@ pub trait RollingLaw: Copy + Send + Sync + 'static {
 /// What the normal and the tangential law of a contact return together.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactResponse<L: Lane> {
-    /// The bodies press or pull on each other: false over a dent that is no longer reached.
+    /// See [`NormalResponse::joined`].
     pub joined: L::Mask,
     /// Normal force F_n \[N\], compression positive.
     pub normal_force: L,

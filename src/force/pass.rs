@@ -212,7 +212,7 @@ impl PairPass {
             min_radius: 2.0 * effective_radius,
         };
         let mut touches = BlockTouches::zeroed();
-        touches.put_none(0);
+        touches.put_none();
         touches.put_any(0, &pair, 0.0);
         let mut batch = LawBatch {
             simd: Simd::Scalar,
@@ -296,7 +296,8 @@ impl PairPass {
         observed: &mut Observed,
     ) {
         let columns = section.columns;
-        let kind = self.bodies.of_any_radius();
+        let (kind, lasts) = (self.bodies.of_any_radius(), self.laws.lasts());
+        let ellipsoids = kind == Bodies::Ellipsoids;
         let walls = section.partners == Partners::Wall;
         let PassInput { stride, time_step, .. } = *input;
         let rolling = self.rolling.is_some();
@@ -325,8 +326,7 @@ impl PairPass {
                 observed.line = line + place - blocks.start * BLOCK;
                 let wall = walls.then(|| section.second[place]);
                 let touches = &answered.touches[place / BLOCK - batch.start];
-                let (first, lasts) = (section.first_of(place), self.laws.lasts());
-                observed.take(touches, place % BLOCK, first, wall, (kind == Bodies::Ellipsoids, lasts));
+                observed.take(touches, place % BLOCK, section.first_of(place), wall, (ellipsoids, lasts));
             }
         }
     }

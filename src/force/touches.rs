@@ -20,7 +20,7 @@ const DEAD: f64 = f64::NEG_INFINITY;
 pub struct Content {
     /// Relative spins even between equal spheres, for rolling laws.
     pub rolling: bool,
-    /// What the energy ledger and an observer need beside forces: imposed and branch vectors, energies, stiffness.
+    /// What the energy ledger and an observer need beside forces, and the factors of elliptical contacts.
     pub detailed: bool,
     /// The normal law's [`super::law::NormalLaw::range`], 0 if its memory ends with the touch.
     pub range: f64,
@@ -82,8 +82,9 @@ pub struct BlockTouches {
     relative_spin: Numbers<3>,
     /// Moment of the rolling law, if there is one.
     moment: Numbers<3>,
-    /// Imposed velocity, if faces move; this and what follows also where details are wanted.
+    /// Imposed velocity, if faces move or details are wanted.
     imposed_velocity: Numbers<3>,
+    /// This and what follows where details are wanted.
     branch: Numbers<3>,
     min_radius: Numbers<1>,
     /// Factors of elliptical contacts.
@@ -194,9 +195,9 @@ impl BlockTouches {
         self.arm_vectors.put(3, lane, &arms[1]);
     }
 
-    /// The lanes from `lane` on hold no contact.
-    pub fn put_none(&mut self, lane: usize) {
-        self.numbers.0[6].0[lane..].fill(DEAD);
+    /// No contacts.
+    pub fn put_none(&mut self) {
+        self.numbers.0[6].0.fill(DEAD);
     }
 
     /// Lanes from `lane` on whose law is asked. NaN is alive.
@@ -211,13 +212,13 @@ impl BlockTouches {
     #[inline(always)]
     #[must_use]
     pub fn touch<L: Lane, const DETAILED: bool>(&self, lane: usize) -> Touch<L> {
-        let factor = |number| if DETAILED { self.factors.one(number, lane) } else { L::splat(1.0) };
+        let one = L::splat(1.0);
         Touch {
             overlap: self.numbers.one(6, lane),
             overlap_rate: self.numbers.one(7, lane),
             effective_radius: self.numbers.one(11, lane),
-            radius_factor: factor(0),
-            overlap_factor: factor(1),
+            radius_factor: if DETAILED { self.factors.one(0, lane) } else { one },
+            overlap_factor: if DETAILED { self.factors.one(1, lane) } else { one },
             size: self.numbers.one(10, lane),
             effective_mass: self.numbers.one(9, lane),
             normal: self.numbers.vector(0, lane),
@@ -267,7 +268,7 @@ impl BlockTouches {
         }
     }
 
-    /// The normal law's answer; stiffness and energies only if they were taken in.
+    /// The normal law's answer as the other laws get it; energies only if they were taken in.
     #[inline(always)]
     #[must_use]
     pub fn normal<L: Lane>(&self, lane: usize) -> NormalResponse<L> {
@@ -275,7 +276,7 @@ impl BlockTouches {
             force: self.normal.one(0, lane),
             contact_radius: self.normal.one(1, lane),
             dashpot: self.normal.one(2, lane),
-            stiffness: self.stiffness.one(0, lane),
+            stiffness: L::splat(f64::NAN),
             energies: self.energies.energies(lane),
         }
     }
@@ -328,11 +329,10 @@ impl BlockTouches {
     pub fn response<L: Lane>(&self, lane: usize) -> ContactResponse<L> {
         let normal = self.normal(lane);
         ContactResponse {
-            // Written so that NaN counts as joined and is found.
-            joined: L::splat(0.0).not_at_least(normal.contact_radius),
+            joined: normal.joined(),
             normal_force: normal.force,
             tangential_force: self.tangential.vector(0, lane),
-            stiffness: normal.stiffness,
+            stiffness: self.stiffness.one(0, lane),
             energies: normal.energies,
         }
     }
@@ -366,8 +366,10 @@ impl BlockTouches {
     pub fn excess(&self, limit: f64) -> Option<(usize, f64)> {
         // Written so that NaN counts as a fault.
         let within = |lane: usize| self.numbers.0[6].0[lane] <= limit * self.min_radius.0[0].0[lane];
-        let all = (0..BLOCK).fold(true, |all, lane| all & within(lane));
-        (0..BLOCK).find(|&lane| !all && !within(lane)).map(|lane| (lane, self.overlap_ratio(lane)))
+        if (0..BLOCK).fold(true, |all, lane| all & within(lane)) {
+            return None;
+        }
+        (0..BLOCK).find(|&lane| !within(lane)).map(|lane| (lane, self.overlap_ratio(lane)))
     }
 
     /// The normals of the whole block.

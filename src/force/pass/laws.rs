@@ -53,42 +53,42 @@ pub trait RollingStage: Send + Sync {
     fn columns(&self) -> Vec<Column>;
     /// Recompute what depends on the time step \[s\].
     fn prepare(&mut self, time_step: f64);
-    /// The rolling law; its memory begins at column `first` of each block.
-    fn evaluate(&self, batch: &mut LawBatch, first: usize);
+    /// The rolling law; its memory begins at column `first` of each block. `lasts`: see [`LawStages::lasts`].
+    fn evaluate(&self, batch: &mut LawBatch, first: usize, lasts: bool);
 }
 
-/// A stage as a method that calls the loop compiled for the level and the details that the batch asks for.
+/// The method `run`, which calls the method `lanes` compiled for the level and the details that the batch asks for.
 macro_rules! stage {
-    ($name:ident $avx2:ident $avx512:ident $lanes:ident ($($arg:ident: $type:ty),*)) => {
-        fn $name(&self, batch: &mut LawBatch, $($arg: $type),*) {
+    ($($arg:ident: $type:ty),*) => {
+        fn run(&self, batch: &mut LawBatch, $($arg: $type),*) {
             match (batch.simd, batch.detailed) {
                 // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
                 #[cfg(target_arch = "x86_64")]
-                (Simd::Avx512, false) => unsafe { self.$avx512::<false>(batch, $($arg),*) },
+                (Simd::Avx512, false) => unsafe { self.avx512::<false>(batch, $($arg),*) },
                 // SAFETY: as above.
                 #[cfg(target_arch = "x86_64")]
-                (Simd::Avx512, true) => unsafe { self.$avx512::<true>(batch, $($arg),*) },
+                (Simd::Avx512, true) => unsafe { self.avx512::<true>(batch, $($arg),*) },
                 // SAFETY: as above.
                 #[cfg(target_arch = "x86_64")]
-                (Simd::Avx2, false) => unsafe { self.$avx2::<false>(batch, $($arg),*) },
+                (Simd::Avx2, false) => unsafe { self.avx2::<false>(batch, $($arg),*) },
                 // SAFETY: as above.
                 #[cfg(target_arch = "x86_64")]
-                (Simd::Avx2, true) => unsafe { self.$avx2::<true>(batch, $($arg),*) },
-                (_, false) => self.$lanes::<f64, false>(batch, $($arg),*),
-                (_, true) => self.$lanes::<f64, true>(batch, $($arg),*),
+                (Simd::Avx2, true) => unsafe { self.avx2::<true>(batch, $($arg),*) },
+                (_, false) => self.lanes::<f64, false>(batch, $($arg),*),
+                (_, true) => self.lanes::<f64, true>(batch, $($arg),*),
             }
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
-        fn $avx2<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
-            self.$lanes::<F64x4, DETAILED>(batch, $($arg),*);
+        fn avx2<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
+            self.lanes::<F64x4, DETAILED>(batch, $($arg),*);
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx512f,avx512vl")]
-        fn $avx512<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
-            self.$lanes::<F64x8, DETAILED>(batch, $($arg),*);
+        fn avx512<const DETAILED: bool>(&self, batch: &mut LawBatch, $($arg: $type),*) {
+            self.lanes::<F64x8, DETAILED>(batch, $($arg),*);
         }
     };
 }
@@ -97,7 +97,7 @@ macro_rules! stage {
 pub(super) struct Stages<C>(pub C);
 
 impl<C: ContactLaw> Stages<C> {
-    stage!(run avx2 avx512 lanes (rolling: Option<&dyn RollingStage>, output: Option<&mut Output>));
+    stage!(rolling: Option<&dyn RollingStage>, output: Option<&mut Output>);
 
     #[inline(always)]
     fn lanes<L: Lane, const DETAILED: bool>(
@@ -109,7 +109,7 @@ impl<C: ContactLaw> Stages<C> {
         self.normal::<L, DETAILED>(batch);
         if let Some(output) = output {
             if let Some(rolling) = rolling {
-                rolling.evaluate(batch, C::MEMORY);
+                rolling.evaluate(batch, C::MEMORY, C::LASTS);
             }
             self.complete::<L, DETAILED>(batch, output);
         }
@@ -215,10 +215,10 @@ impl<C: ContactLaw> LawStages for Stages<C> {
 pub(super) struct Rolling<R>(pub R);
 
 impl<R: RollingLaw> Rolling<R> {
-    stage!(run avx2 avx512 lanes (first: usize));
+    stage!(first: usize, lasts: bool);
 
     #[inline(always)]
-    fn lanes<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, first: usize) {
+    fn lanes<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, first: usize, lasts: bool) {
         const { assert!(R::MEMORY <= MAX_MEMORY, "a rolling law has more memory columns than the loop holds") };
         let zero = L::splat(0.0);
         for (block, touches) in batch.touches.iter_mut().enumerate() {
@@ -229,11 +229,13 @@ impl<R: RollingLaw> Rolling<R> {
                 let values = &mut values[..R::MEMORY];
                 load(values, own, lane);
                 let response = self.0.evaluate(&touch, &normal, values);
-                // The resistance ends with the contact circle, though the normal law's memory may go on. Written so that
-                // NaN counts as joined and is found.
-                let joined = zero.not_at_least(normal.contact_radius);
-                keep(values, own, lane, touches.alive::<L>(lane) & joined);
-                touches.put_rolling::<L, DETAILED>(lane, &response.only(joined));
+                let mut resisting = touches.alive::<L>(lane);
+                if lasts {
+                    // The resistance ends with the contact circle, though the normal law's memory goes on.
+                    resisting = resisting & normal.joined();
+                }
+                keep(values, own, lane, resisting);
+                touches.put_rolling::<L, DETAILED>(lane, &response.only(resisting));
             });
         }
     }
@@ -246,8 +248,8 @@ impl<R: RollingLaw> RollingStage for Rolling<R> {
     fn prepare(&mut self, time_step: f64) {
         self.0.prepare(time_step);
     }
-    fn evaluate(&self, batch: &mut LawBatch, first: usize) {
-        self.run(batch, first);
+    fn evaluate(&self, batch: &mut LawBatch, first: usize, lasts: bool) {
+        self.run(batch, first, lasts);
     }
 }
 

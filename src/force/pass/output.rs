@@ -147,7 +147,7 @@ impl LineForm {
 }
 
 impl Output<'_> {
-    /// The lines of some blocks whose touches hold details. Between ellipsoids the normals of the contacts whose law was
+    /// The lines of some blocks whose touches hold details. Of ellipsoids the normals of the contacts whose law was
     /// asked go to three memory columns, from `normals` on.
     pub fn write(&mut self, batch: &mut LawBatch, normals: usize) {
         match batch.simd {

@@ -91,6 +91,7 @@ fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [Block
             }
             pair.follow_cell(motion);
             if content.detailed {
+                // Here already, so that no register has to hold them until the touch is known.
                 touches.put_details(lane, &pair.branch, &pair.imposed_velocity);
             }
             let pair = geometry::touch(&pair, unequal);

@@ -2,7 +2,7 @@ use super::*;
 use crate::contact::shift::{self, ShiftTable};
 use crate::force::observe::{Observation, Wanted};
 use crate::force::registry::Role;
-use crate::force::testing::{choice, pair, properties, pvdf};
+use crate::force::testing::{choice, nmc, pair, properties, pvdf};
 
 const RADIUS: f64 = 1e-3;
 const PAIRS: usize = 45;
@@ -23,9 +23,18 @@ fn records() -> Vec<Record> {
         .collect()
 }
 
-/// Bits of force and torque on the first of each pair and of its memory after some steps; then, from two ways of looking,
-/// the largest stiffness.
-fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> (Vec<u64>, [f64; 2]) {
+/// What some steps leave behind.
+#[derive(PartialEq)]
+struct Left {
+    /// Bits of force and torque on the first of each pair and of its memory.
+    bits: Vec<u64>,
+    /// Bits of all that the lines hold.
+    lines: Vec<u64>,
+    /// The largest stiffness from two ways of looking.
+    stiffness: [f64; 2],
+}
+
+fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> Left {
     let mut pass = PairPass::new(config, bodies);
     let time_step = 1e-5;
     pass.prepare(time_step, false);
@@ -66,7 +75,7 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> (Vec<u6
         section.read_memory(place, &mut memory);
         bits.extend(line[..3].iter().chain(&line[4..7]).chain(&memory).map(|value| value.to_bits()));
     }
-    let looked = [false, true].map(|sums| {
+    let stiffness = [false, true].map(|sums| {
         let wanted = Wanted { sums, samples: false };
         let observation = Observation::new(wanted);
         let mut observed = Observed { wanted, owned: PAIRS, line: 0, observation, forces: &mut [], first_line: 0 };
@@ -75,7 +84,7 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> (Vec<u6
         pass.observe(&input, bodies, &section, 0..section.blocks(), room, &mut observed);
         observed.observation.max_stiffness
     });
-    (bits, looked)
+    Left { bits, lines: lines.iter().map(|value| value.to_bits()).collect(), stiffness }
 }
 
 #[test]
@@ -84,19 +93,24 @@ fn equal_radii_and_a_ledger_change_no_bits_at_any_width() {
     let hertz = pair(properties(5e7, 0.25, Vec::new()), choice(Role::Normal, "hertz", &[]));
     let relaxing = pair(pvdf(), choice(Role::Normal, "maxwell_zener", &[]));
     let rolling = Some(choice(Role::Rolling, "spring_slider", &[]));
+    let dented = pair(nmc(), choice(Role::Normal, "thornton", &[]));
     for config in [
         PairConfig { tangential: mindlin.clone(), ..hertz.clone() },
-        PairConfig { tangential: mindlin.clone(), rolling, ..hertz },
+        PairConfig { tangential: mindlin.clone(), rolling: rolling.clone(), ..hertz },
+        PairConfig { tangential: mindlin.clone(), rolling, ..dented },
         PairConfig { tangential: mindlin, ..relaxing },
     ] {
-        let (expected, stiffness) = run(&config, Bodies::Spheres, Simd::Scalar, false);
+        let Left { bits: expected, stiffness, .. } = run(&config, Bodies::Spheres, Simd::Scalar, false);
         assert!(stiffness[0] > 0.0 && stiffness[0] == stiffness[1], "{stiffness:?}");
         let touching = expected.iter().filter(|bits| **bits != 0.0_f64.to_bits()).count();
         assert!(touching > expected.len() / 3 && touching < expected.len(), "{touching} of {}", expected.len());
         for simd in [Simd::Scalar, Simd::Avx2, Simd::Avx512].into_iter().filter(|level| level.is_available()) {
             for bodies in [Bodies::Spheres, Bodies::EqualSpheres] {
                 for ledger in [false, true] {
-                    let same = run(&config, bodies, simd, ledger) == (expected.clone(), stiffness);
+                    let (scalar, lanes) =
+                        (run(&config, bodies, Simd::Scalar, ledger), run(&config, bodies, simd, ledger));
+                    assert!(lanes == scalar, "{bodies:?} {simd:?}, ledger {ledger}");
+                    let same = lanes.bits == expected && lanes.stiffness == stiffness;
                     assert!(same, "{bodies:?} {simd:?}, ledger {ledger}");
                 }
             }

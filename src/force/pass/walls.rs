@@ -12,15 +12,16 @@ pub(super) fn geometry(source: &Source, touches: &mut [BlockTouches; BATCH]) -> 
     let Source { input, bodies, section, ref blocks, content, .. } = *source;
     let mut excess = None;
     for (block, touches) in blocks.clone().zip(touches) {
-        touches.put_none(0);
+        touches.put_none();
         for place in block * BLOCK..((block + 1) * BLOCK).min(section.count) {
             let (first, wall, lane) = (section.first[place] as usize / RECORD, section.second[place], place % BLOCK);
-            if let Some(shape) = bodies.shapes.get(first) {
-                let touch = touch::wall(&bodies.records[first], shape, wall, input.motion);
+            let record = &bodies.records[first];
+            if bodies.shapes.is_empty() {
+                touches.put_any(lane, &geometry::wall(record, wall, input.motion), content.range);
+            } else {
+                let touch = touch::wall(record, &bodies.shapes[first], wall, input.motion);
                 touches.put_any(lane, &touch.pair, content.range);
                 touches.put_arm_vectors(lane, &touch.arms);
-            } else {
-                touches.put_any(lane, &geometry::wall(&bodies.records[first], wall, input.motion), content.range);
             }
         }
         let found = || touches.excess(input.max_overlap_fraction);
