@@ -305,7 +305,7 @@ impl PairPass {
         let form = LineForm { stride, ledger: false, time_step, bodies: kind, rolling, walls };
         let nowhere = LineRing { values: &mut [], first: 0, mask: 0 };
         let mut output = Output { lines: nowhere, form };
-        let line = observed.line;
+        let (line, single) = (observed.line, observed.single());
         for start in blocks.clone().step_by(BATCH) {
             let batch = start..(start + BATCH).min(blocks.end);
             let source = Source { input, bodies, section, blocks: batch.clone(), content, normals: self.columns };
@@ -313,9 +313,9 @@ impl PairPass {
             memory.clear();
             memory.extend_from_slice(&section.memory[batch.start * columns..batch.end * columns]);
             let touches = &mut touches[..batch.len()];
-            let (detailed, energies) = (true, observed.single());
-            let mut answered = LawBatch { simd: input.simd, detailed, energies, touches, memory, columns };
-            if !observed.single() {
+            let (simd, detailed) = (input.simd, true);
+            let mut answered = LawBatch { simd, detailed, energies: single, touches, memory, columns };
+            if !single {
                 // The normal law knows the stiffness.
                 self.laws.evaluate(&mut answered, None, None);
                 observed.take_maxima(answered.touches);

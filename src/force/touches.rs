@@ -295,11 +295,16 @@ impl BlockTouches {
         }
     }
 
-    /// Take in the rolling law's answer.
+    /// Take in the rolling law's answer. `DETAILED`: with its energies, if wanted.
     #[inline(always)]
-    pub fn put_rolling<L: Lane, const DETAILED: bool>(&mut self, lane: usize, rolling: &VectorResponse<L>) {
+    pub fn put_rolling<L: Lane, const DETAILED: bool>(
+        &mut self,
+        lane: usize,
+        rolling: &VectorResponse<L>,
+        energies: bool,
+    ) {
         self.moment.put(0, lane, &rolling.value);
-        if DETAILED {
+        if DETAILED && energies {
             self.rolling_energies.put_energies(lane, &rolling.energies);
         }
     }

@@ -224,18 +224,22 @@ impl<R: RollingLaw> Rolling<R> {
         for (block, touches) in batch.touches.iter_mut().enumerate() {
             let own = &mut batch.memory[block * batch.columns + first..][..R::MEMORY];
             for_each_group!(L, lane, {
-                let (touch, normal) = (touches.touch::<L, DETAILED>(lane), touches.normal(lane));
-                let mut values = [zero; MAX_MEMORY];
-                let values = &mut values[..R::MEMORY];
-                load(values, own, lane);
-                let response = self.0.evaluate(&touch, &normal, values);
                 let mut resisting = touches.alive::<L>(lane);
-                if lasts {
-                    // The resistance ends with the contact circle, though the normal law's memory goes on.
-                    resisting = resisting & normal.joined();
+                if DETAILED && !L::any(resisting) {
+                    forget::<L>(own, lane);
+                } else {
+                    let (touch, normal) = (touches.touch::<L, DETAILED>(lane), touches.normal(lane));
+                    let mut values = [zero; MAX_MEMORY];
+                    let values = &mut values[..R::MEMORY];
+                    load(values, own, lane);
+                    let response = self.0.evaluate(&touch, &normal, values);
+                    if lasts {
+                        // The resistance ends with the contact circle, though the normal law's memory goes on.
+                        resisting = resisting & normal.joined();
+                    }
+                    keep(values, own, lane, resisting);
+                    touches.put_rolling::<L, DETAILED>(lane, &response.only(resisting), batch.energies);
                 }
-                keep(values, own, lane, resisting);
-                touches.put_rolling::<L, DETAILED>(lane, &response.only(resisting));
             });
         }
     }
