@@ -136,14 +136,33 @@ fn numbers<L: Lane>(r: &ContactResponse<L>) -> Vec<L> {
     [&[r.normal_force, r.stiffness][..], &r.tangential_force, &energies(&r.energies)].concat()
 }
 
-/// Whether the lanes of some numbers have the bits of those computed alone.
-fn same(lane: usize, values: impl Iterator<Item = (f64, f64)>) -> Result<(), String> {
-    for (index, (a, b)) in values.enumerate() {
-        if a.to_bits() != b.to_bits() || !a.is_finite() {
-            return Err(format!("lane {lane}, number {index}: {a:e} and {b:e}"));
+/// Whether some steps of eight touches in lanes give the bits of each of them alone, in answers and memory. `lanes` and
+/// `alone` evaluate a law with this number of memory columns.
+fn compare(
+    numbers: &Numbers,
+    memory: usize,
+    lanes: impl Fn(&[[f64; 15]], &mut [Portable8]) -> Vec<Portable8>,
+    alone: impl Fn(&[f64; 15], &mut [f64]) -> Vec<f64>,
+) -> Result<(), String> {
+    let mut wide = [Portable8::splat(0.0); MAX_MEMORY];
+    let mut narrow = [[0.0; MAX_MEMORY]; 8];
+    for step in numbers.chunks(8) {
+        let together = lanes(step, &mut wide[..memory]);
+        for lane in 0..8 {
+            let answer = alone(&step[lane], &mut narrow[lane][..memory]);
+            let kept = (0..memory).map(|k| (wide[k].0[lane], narrow[lane][k]));
+            for (index, (a, b)) in together.iter().map(|v| v.0[lane]).zip(answer).chain(kept).enumerate() {
+                if a.to_bits() != b.to_bits() || !a.is_finite() {
+                    return Err(format!("lane {lane}, number {index}: {a:e} and {b:e}"));
+                }
+            }
         }
     }
     Ok(())
+}
+
+fn touches(step: &[[f64; 15]]) -> Touch<Portable8> {
+    gather(&step.iter().map(touch).collect::<Vec<_>>())
 }
 
 struct CompareLanes<'a>(&'a Numbers);
@@ -152,18 +171,12 @@ impl LawVisitor for CompareLanes<'_> {
     type Output = Result<(), String>;
     fn visit<C: ContactLaw>(self, mut law: C) -> Result<(), String> {
         law.prepare(1e-5);
-        let mut wide = [Portable8::splat(0.0); MAX_MEMORY];
-        let mut narrow = [[0.0; MAX_MEMORY]; 8];
-        for step in self.0.chunks(8) {
-            let touches: Vec<Touch<f64>> = step.iter().map(touch).collect();
-            let together = numbers(&law.evaluate(&gather(&touches), &mut wide[..C::MEMORY]));
-            for lane in 0..8 {
-                let alone = numbers(&law.evaluate(&touches[lane], &mut narrow[lane][..C::MEMORY]));
-                let memory = (0..C::MEMORY).map(|k| (wide[k].0[lane], narrow[lane][k]));
-                same(lane, together.iter().map(|v| v.0[lane]).zip(alone).chain(memory))?;
-            }
-        }
-        Ok(())
+        compare(
+            self.0,
+            C::MEMORY,
+            |step, memory| numbers(&law.evaluate(&touches(step), memory)),
+            |one, memory| numbers(&law.evaluate(&touch(one), memory)),
+        )
     }
 }
 
@@ -171,29 +184,28 @@ impl RollingVisitor for CompareLanes<'_> {
     type Output = Result<(), String>;
     fn visit<R: RollingLaw>(self, mut law: R) -> Result<(), String> {
         law.prepare(1e-5);
-        let mut wide = [Portable8::splat(0.0); MAX_MEMORY];
-        let mut narrow = [[0.0; MAX_MEMORY]; 8];
-        for step in self.0.chunks(8) {
-            let touches: Vec<Touch<f64>> = step.iter().map(touch).collect();
-            let normals: Vec<_> = step.iter().map(normal_response).collect();
-            let lanes = |f: fn(&NormalResponse<f64>) -> f64| Portable(std::array::from_fn(|k| f(&normals[k])));
-            let normal = NormalResponse {
-                force: lanes(|n| n.force),
-                contact_radius: lanes(|n| n.contact_radius),
-                stiffness: lanes(|n| n.stiffness),
-                dashpot: lanes(|n| n.dashpot),
-                energies: Energies::zero(),
-            };
-            let together = law.evaluate(&gather(&touches), &normal, &mut wide[..R::MEMORY]);
-            let together = [&together.value[..], &energies(&together.energies)].concat();
-            for lane in 0..8 {
-                let alone = law.evaluate(&touches[lane], &normals[lane], &mut narrow[lane][..R::MEMORY]);
-                let alone = [&alone.value[..], &energies(&alone.energies)].concat();
-                let memory = (0..R::MEMORY).map(|k| (wide[k].0[lane], narrow[lane][k]));
-                same(lane, together.iter().map(|v| v.0[lane]).zip(alone).chain(memory))?;
-            }
-        }
-        Ok(())
+        compare(
+            self.0,
+            R::MEMORY,
+            |step, memory| moments(&law.evaluate(&touches(step), &normal_responses(step), memory)),
+            |one, memory| moments(&law.evaluate(&touch(one), &normal_response(one), memory)),
+        )
+    }
+}
+
+fn moments<L: Lane>(r: &VectorResponse<L>) -> Vec<L> {
+    [&r.value[..], &energies(&r.energies)].concat()
+}
+
+fn normal_responses(step: &[[f64; 15]]) -> NormalResponse<Portable8> {
+    let normals: Vec<_> = step.iter().map(normal_response).collect();
+    let lanes = |f: fn(&NormalResponse<f64>) -> f64| Portable(std::array::from_fn(|k| f(&normals[k])));
+    NormalResponse {
+        force: lanes(|n| n.force),
+        contact_radius: lanes(|n| n.contact_radius),
+        stiffness: lanes(|n| n.stiffness),
+        dashpot: lanes(|n| n.dashpot),
+        energies: Energies::zero(),
     }
 }
 
