@@ -194,8 +194,9 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         walls,
         total: initial.global.particles as u32,
         skin: 0.0,
+        stride: 0,
     };
-    let turns = passes.iter().any(|pass| pass.stride() > 4) || extremes.max_spin > 0.0 || extremes.ellipsoids;
+    let turns = passes.iter().any(|pass| pass.width() > 4) || extremes.max_spin > 0.0 || extremes.ellipsoids;
     let mut cautions: Vec<String> =
         config.pairs.iter().filter_map(|pair| cautions::of_pair(pair, extremes.sizes)).collect();
     cautions.dedup();
@@ -340,6 +341,7 @@ pub fn timed_simulation(
     let started = Instant::now();
     let mut model = model(&comm, config, &initial)?;
     model.lists.skin = model.inner_skin();
+    model.lists.stride = model.line_stride();
     if initial.memory.keys.is_empty() {
         initial.memory = ContactMemory::new(model.lists.memory_width());
     }

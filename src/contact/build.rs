@@ -31,6 +31,8 @@ pub struct BuildContext {
     pub total: u32,
     /// Inner skin \[m\]: pairs up to this gap are listed.
     pub skin: f64,
+    /// Numbers per output line.
+    pub stride: usize,
 }
 
 impl BuildContext {
@@ -110,7 +112,7 @@ impl BuildContext {
             view.refresh(sections, code);
             self.refresh_walls(sections, &view.owners, particles, sides);
         });
-        list.index(particles, self.total);
+        list.index(particles, self.total, self.stride);
     }
 
     fn refresh_walls(&self, sections: &mut [Section], owners: &Range<usize>, particles: &Particles, sides: [f64; 3]) {

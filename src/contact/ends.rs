@@ -1,38 +1,83 @@
 //! The ends of contacts as the sums read them, without looking twice whether they are there.
 
-use super::list::{Run, Strip};
+use super::list::{CHUNK, Run, Strip};
 
-/// Most output lines of a rank: what fits beside the side in an [`End`].
-pub const MAX_LINES: usize = 1 << 29;
+/// Up to so many ends of one kind the sums have a loop of their own for each number.
+pub const MOST_WRITTEN_OUT: usize = 8;
 
-/// One end of a contact as its particle sees it: a number and the side. The number is the slot of the strip's buffer
-/// where the sums find the output line; of a ghost, which nobody sums here, the line's own.
+/// One end of a contact as its particle sees it: a number and the side. The number is where the strip's buffer holds the
+/// output line for the sums, counted in pairs of `f64`; of a ghost, which nobody sums here, the line's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct End(u32);
 
 impl End {
+    /// The largest number.
+    pub const MAX: usize = u32::MAX as usize >> 1;
+
     /// `second`: the particle is the contact's second.
     pub(super) fn new(number: usize, second: bool) -> Self {
-        Self((number as u32) << 3 | u32::from(second) << 2)
+        Self((number as u32) << 1 | u32::from(second))
     }
-    /// Slot or line.
+    /// Place in pairs of `f64`, or line.
     #[inline(always)]
     #[must_use]
     pub fn number(self) -> usize {
-        (self.0 >> 3) as usize
+        (self.0 >> 1) as usize
     }
-    /// 0 at the contact's first, 4 at its second: in a line the torque on the second follows four places after that
-    /// on the first.
+    /// Place of the output line in the buffer, in `f64`, of an end on the side that `SECOND` says.
     #[inline(always)]
     #[must_use]
-    pub fn side(self) -> usize {
-        (self.0 & 4) as usize
+    pub fn place<const SECOND: bool>(self) -> usize {
+        // Twice the number; so written it costs no instruction.
+        (self.0 as usize).wrapping_sub(usize::from(SECOND))
     }
     /// The particle is the contact's second.
     #[inline(always)]
     #[must_use]
     pub fn is_second(self) -> bool {
-        self.side() != 0
+        self.0 & 1 != 0
+    }
+}
+
+/// The order in which a chunk's particles are visited to sum over the ends of one side: by how many they have, so that
+/// the length of the loop over them changes a few times only.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Visits {
+    /// Places within the chunk, each less than the number of its particles.
+    places: [u8; CHUNK],
+    /// How many particles have no end, one, two …; the last counts all above [`MOST_WRITTEN_OUT`].
+    groups: [u8; MOST_WRITTEN_OUT + 2],
+}
+
+impl Visits {
+    /// From the number of ends of each of the chunk's particles.
+    pub(super) fn new(counts: &[usize]) -> Self {
+        let group = |count: usize| count.min(MOST_WRITTEN_OUT + 1);
+        let mut visits = Self { places: [0; CHUNK], groups: [0; MOST_WRITTEN_OUT + 2] };
+        for count in counts {
+            visits.groups[group(*count)] += 1;
+        }
+        let mut next = [0; MOST_WRITTEN_OUT + 2];
+        for number in 1..next.len() {
+            next[number] = next[number - 1] + usize::from(visits.groups[number - 1]);
+        }
+        for (place, count) in (0..).zip(counts) {
+            let next = &mut next[group(*count)];
+            visits.places[*next] = place;
+            *next += 1;
+        }
+        visits
+    }
+
+    /// The groups in the order of their numbers of ends, the last with all above [`MOST_WRITTEN_OUT`].
+    #[inline(always)]
+    pub fn groups(&self) -> impl Iterator<Item = &[u8]> {
+        let mut rest = self.places.as_slice();
+        self.groups.iter().map(move |count| {
+            let (group, others) = rest.split_at(usize::from(*count).min(rest.len()));
+            rest = others;
+            group
+        })
     }
 }
 
@@ -41,10 +86,11 @@ impl End {
 pub struct ChunkEnds<'a> {
     /// Of the chunk's particles and one more, rising, none beyond `ends`.
     offsets: &'a [u32],
+    /// Of each particle first those of contacts of which it is the second.
     ends: &'a [End],
-    /// Places within the chunk, each less than the number of its particles.
-    summing: &'a [u8],
-    slots: usize,
+    /// For the ends of firsts and of seconds.
+    visits: &'a [Visits; 2],
+    room: usize,
 }
 
 impl<'a> ChunkEnds<'a> {
@@ -55,25 +101,45 @@ impl<'a> ChunkEnds<'a> {
         &self.ends[self.offsets[place] as usize..self.offsets[place + 1] as usize]
     }
 
-    /// The chunk's places in the order of summing, each with its ends.
-    #[inline(always)]
-    pub fn in_order(self) -> impl Iterator<Item = (usize, &'a [End])> {
-        self.summing.iter().map(move |place| {
-            let place = usize::from(*place);
-            // SAFETY: `ContactList::index` makes what the fields promise; the arrays are private to this module's parent,
-            // and strips are not changed between two calls of it.
-            let ends = unsafe {
-                let (from, to) = (self.offsets.get_unchecked(place), self.offsets.get_unchecked(place + 1));
-                self.ends.get_unchecked(*from as usize..*to as usize)
-            };
-            (place, ends)
-        })
+    /// The ends of one side of the particle at this place of the chunk.
+    #[must_use]
+    pub fn of_side(&self, place: usize, second: bool) -> &'a [End] {
+        let ends = self.of(place);
+        let (seconds, firsts) = ends.split_at(ends.partition_point(|end| end.is_second()));
+        if second { seconds } else { firsts }
     }
 
-    /// More than the number of any of the ends, see [`Strip::slots`].
+    /// How to visit the particles for the ends of one side.
+    #[inline(always)]
     #[must_use]
-    pub fn slots(&self) -> usize {
-        self.slots
+    pub fn visits(&self, second: bool) -> &'a Visits {
+        &self.visits[usize::from(second)]
+    }
+
+    /// The ends of the side that `SECOND` says of a particle that has `COUNT` of them.
+    ///
+    /// # Safety
+    /// The place comes from that group of [`Self::visits`].
+    #[inline(always)]
+    #[must_use]
+    pub unsafe fn written_out<const SECOND: bool, const COUNT: usize>(&self, place: usize) -> &'a [End; COUNT] {
+        // SAFETY: a place of a group is one of the chunk's particles, of which each has a number in `offsets`, and one
+        // follows the last; that many ends lie from the first number or before the second (`ContactList::index`; the
+        // arrays are private to this module's parent, and strips are not changed between two calls of it).
+        unsafe {
+            let start = if SECOND {
+                *self.offsets.get_unchecked(place) as usize
+            } else {
+                *self.offsets.get_unchecked(place + 1) as usize - COUNT
+            };
+            &*self.ends.as_ptr().add(start).cast()
+        }
+    }
+
+    /// No line of any of the ends reaches beyond so many `f64` of the buffer, see [`Strip::room`].
+    #[must_use]
+    pub fn room(&self) -> usize {
+        self.room
     }
 }
 
@@ -86,7 +152,6 @@ pub struct Reading<'a> {
     pub runs: &'a [Run],
     pub(super) offsets: &'a [u32],
     pub(super) ends: &'a [End],
-    pub(super) summing: &'a [u8],
 }
 
 impl<'a> Reading<'a> {
@@ -98,14 +163,14 @@ impl<'a> Reading<'a> {
         ChunkEnds {
             offsets: &self.offsets[particles.start..=particles.end],
             ends: self.ends,
-            summing: &self.summing[particles],
-            slots: strip.slots,
+            visits: &strip.visits[chunk],
+            room: strip.room(),
         }
     }
 
-    /// The offsets of all particles, their ends, and the places of the owned ones in the order of summing.
+    /// The offsets of all particles and their ends.
     #[must_use]
-    pub fn arrays(&self) -> (&'a [u32], &'a [End], &'a [u8]) {
-        (self.offsets, self.ends, self.summing)
+    pub fn arrays(&self) -> (&'a [u32], &'a [End]) {
+        (self.offsets, self.ends)
     }
 }

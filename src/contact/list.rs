@@ -9,7 +9,7 @@
 //! all other contacts are kept for the step, and copied behind the ring for the chunk whose sums read them, which so
 //! find every line in one buffer.
 
-use super::ends::{End, Reading};
+use super::ends::{End, Reading, Visits};
 use super::section::{BLOCK, PARTNERS, Partners, Section};
 use super::shift;
 use crate::state::ContactKey;
@@ -46,12 +46,14 @@ pub struct Strip {
     pub first_line: usize,
     /// Lines that the ring must hold, a power of two.
     pub ring: usize,
-    /// See [`Strip::slots`]; more than the number of each end of the strip's particles.
-    pub(super) slots: usize,
+    /// See [`Strip::room`]; no line of an end of the strip's particles reaches beyond.
+    room: usize,
     /// Kept lines that the particles' sums read, chunk by chunk.
     pub kept_reads: Vec<u32>,
     /// For each chunk the end of its part of `kept_reads`.
     pub kept_read_ends: Vec<u32>,
+    /// For each chunk the order in which its particles are summed up, over the ends of firsts and of seconds.
+    pub(super) visits: Vec<[Visits; 2]>,
 }
 
 impl Strip {
@@ -61,11 +63,11 @@ impl Strip {
         self.particles.len().div_ceil(CHUNK)
     }
 
-    /// Slots of the buffer: the ring's, then one per kept line that the sums of a chunk read, as many as the chunk
+    /// Numbers in the buffer: the ring's lines, then one per kept line that the sums of a chunk read, as many as the chunk
     /// with the most.
     #[must_use]
-    pub fn slots(&self) -> usize {
-        self.slots
+    pub fn room(&self) -> usize {
+        self.room
     }
 
     /// Kept lines that the sums of a chunk read.
@@ -101,13 +103,12 @@ pub struct ContactList {
     pub kept: usize,
     /// Number of output lines, padding included.
     pub lines: usize,
+    /// Numbers per output line.
+    stride: usize,
     /// `ends[offsets[p]..offsets[p+1]]` are those of local particle `p`.
     offsets: Vec<u32>,
     /// Ends of all particles.
     ends: Vec<End>,
-    /// For each owned particle a place within its chunk: the order in which the chunk's particles are summed up, by the
-    /// number of contacts, so that the processor foresees how often the loop over them runs.
-    summing: Vec<u8>,
 }
 
 impl ContactList {
@@ -129,17 +130,18 @@ impl ContactList {
             kept: 0..0,
             first_line: 0,
             ring: BLOCK,
-            slots: BLOCK,
+            room: 0,
             kept_reads: Vec::new(),
             kept_read_ends: Vec::new(),
+            visits: Vec::new(),
         };
         self.strips = strips.into_iter().map(strip).collect();
     }
 
     /// What a step reads, and the sections, whose memory it changes.
     pub fn parts(&mut self) -> (Reading<'_>, &mut [Section]) {
-        let Self { strips, sections, runs, offsets, ends, summing, .. } = self;
-        (Reading { strips, runs, offsets, ends, summing }, sections)
+        let Self { strips, sections, runs, offsets, ends, .. } = self;
+        (Reading { strips, runs, offsets, ends }, sections)
     }
 
     /// Sections per strip.
@@ -163,6 +165,7 @@ impl ContactList {
         let (end, number) = (self.ends[place], self.ends[place].number());
         let strip = self.strips.partition_point(|strip| strip.particles.end <= particle);
         let line = self.strips.get(strip).map_or(number, |strip| {
+            let number = 2 * number / self.stride;
             let chunk = (particle - strip.particles.start) / CHUNK;
             if number >= strip.ring {
                 return strip.kept_reads_of(chunk)[number - strip.ring] as usize;
@@ -221,8 +224,10 @@ impl ContactList {
         ContactKey { low, high, shift: [shift[0], shift[1], shift[2], 0] }
     }
 
-    /// Number the output lines and order every particle's ends. Call after filling the sections.
-    pub fn index(&mut self, particles: &Particles, total: u32) {
+    /// Number the output lines, of `stride` numbers each, and order every particle's ends. Call after filling the
+    /// sections.
+    pub fn index(&mut self, particles: &Particles, total: u32, stride: usize) {
+        self.stride = stride;
         self.number_lines();
         self.order_ends(particles, total);
         self.order_sums();
@@ -269,34 +274,44 @@ impl ContactList {
         self.lines = line;
     }
 
-    /// From lines to slots, and the order of the sums.
+    /// From lines to places in the strips' buffers, and the order of the sums.
     fn order_sums(&mut self) {
-        let Self { strips, offsets, ends, kept, summing, .. } = self;
-        summing.resize(strips.last().map_or(0, |strip| strip.particles.end), 0);
+        let Self { strips, offsets, ends, kept, stride, .. } = self;
         for strip in strips {
             strip.kept_reads.clear();
             strip.kept_read_ends.clear();
-            strip.slots = strip.ring;
+            strip.visits.clear();
+            let mut most = strip.ring;
             for chunk in 0..strip.chunks() {
                 let particles = strip.chunk(chunk);
-                let offsets = &offsets[particles.start..=particles.end];
-                order_chunk(offsets, &mut summing[particles]);
+                let mut counts = [[0; CHUNK]; 2];
                 let mut slots = strip.ring;
-                for end in &mut ends[offsets[0] as usize..offsets[offsets.len() - 1] as usize] {
-                    let line = end.number();
-                    let slot = if line < *kept {
-                        strip.kept_reads.push(line as u32);
-                        slots += 1;
-                        slots - 1
-                    } else {
-                        line & (strip.ring - 1)
-                    };
-                    *end = End::new(slot, end.is_second());
+                for (place, particle) in particles.clone().enumerate() {
+                    for end in &mut ends[offsets[particle] as usize..offsets[particle + 1] as usize] {
+                        let line = end.number();
+                        let slot = if line < *kept {
+                            strip.kept_reads.push(line as u32);
+                            slots += 1;
+                            slots - 1
+                        } else {
+                            line & (strip.ring - 1)
+                        };
+                        counts[usize::from(end.is_second())][place] += 1;
+                        *end = End::new(slot * *stride / 2, end.is_second());
+                    }
                 }
-                strip.slots = strip.slots.max(slots);
+                strip.visits.push(counts.map(|counts| Visits::new(&counts[..particles.len()])));
                 strip.kept_read_ends.push(strip.kept_reads.len() as u32);
+                most = most.max(slots);
             }
+            strip.room = most * *stride;
         }
+    }
+
+    /// The largest number that an [`End`] has to hold.
+    #[must_use]
+    pub fn largest_number(&self) -> usize {
+        self.strips.iter().map(|strip| strip.room / 2).fold(self.lines, usize::max)
     }
 
     fn order_ends(&mut self, particles: &Particles, total: u32) {
@@ -329,12 +344,12 @@ impl ContactList {
             for (line, place) in (run.line as usize..).zip(places) {
                 let first = section.first_of(place);
                 if section.partners == Partners::Wall {
-                    place_end(first, order_key(total + section.second[place], [0; 3]), End::new(line, false));
+                    place_end(first, order_key(total + section.second[place], [0; 3], false), End::new(line, false));
                 } else {
                     let second = section.second_of(place);
                     let shift = shift::decode(section.shift[place]);
-                    place_end(first, order_key(particles.id[second], shift), End::new(line, false));
-                    place_end(second, order_key(particles.id[first], shift.map(|s| -s)), End::new(line, true));
+                    place_end(first, order_key(particles.id[second], shift, false), End::new(line, false));
+                    place_end(second, order_key(particles.id[first], shift.map(|s| -s), true), End::new(line, true));
                 }
             }
         }
@@ -342,21 +357,6 @@ impl ContactList {
         ends.clear();
         ends.resize(keyed.len(), End::new(0, false));
         sort_ends(offsets, &mut keyed, ends);
-    }
-}
-
-/// See [`ContactList::summing`].
-fn order_chunk(offsets: &[u32], summing: &mut [u8]) {
-    const PLACES: u16 = CHUNK as u16 - 1;
-    let mut keys = [0; CHUNK];
-    for (place, bounds) in offsets.windows(2).enumerate() {
-        let count = ((bounds[1] - bounds[0]) as usize).min(usize::from(u16::MAX) / CHUNK);
-        keys[place] = (count * CHUNK + place) as u16;
-    }
-    let keys = &mut keys[..summing.len()];
-    keys.sort_unstable();
-    for (slot, key) in summing.iter_mut().zip(&*keys) {
-        *slot = (key & PLACES) as u8;
     }
 }
 
@@ -410,10 +410,11 @@ fn ring_of(strip: &Strip, runs: &[Run], near: &[Section], first_section: usize, 
     longest.max().unwrap_or(BLOCK).next_power_of_two()
 }
 
-/// Orders by partner id, then by shift, x first.
-fn order_key(partner: u32, shift: [i32; 3]) -> u64 {
+/// Orders by partner id, then by shift, x first. A particle is the second in contacts with lower ids; so it is counted
+/// also where its partner is an image of itself, so that ends of seconds always come before those of firsts.
+fn order_key(partner: u32, shift: [i32; 3], second: bool) -> u64 {
     let [x, y, z] = shift.map(|s| (s + 128) as u64);
-    u64::from(partner) << 24 | x << 16 | y << 8 | z
+    u64::from(!second) << 56 | u64::from(partner) << 24 | x << 16 | y << 8 | z
 }
 
 #[cfg(test)]
@@ -439,7 +440,7 @@ mod tests {
         }
         fill(0, 1, &(0..200).step_by(3).map(|p| (p, 200 + p / 2)).collect::<Vec<_>>());
         fill(1, 3, &(250..300).map(|p| (p, 300 + p % 7)).collect::<Vec<_>>());
-        list.index(particles, 310);
+        list.index(particles, 310, 6);
         list
     }
 

@@ -82,6 +82,12 @@ pub trait Lane:
     fn relative_spin(records: &[Record], pairs: [&[u32]; 2]) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
+    /// Transposed store of six numbers: lane `k` of the values goes to `rows[k * stride..][..6]`.
+    #[inline(always)]
+    fn scatter_six([a, b, c, d, e, f]: [Self; 6], rows: &mut [f64], stride: usize) {
+        Self::scatter([a, b, c, d], rows, stride, 0);
+        Self::scatter([c, d, e, f], rows, stride, 2);
+    }
     /// The shapes of `WIDTH` particles, transposed: semi-axes, mean radius, orientation; at the offsets of their
     /// records.
     fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE];

@@ -40,7 +40,7 @@ const LIST_AHEAD: usize = 2 * RECORDS_AHEAD;
 pub struct PassInput<'a> {
     /// Cell.
     pub motion: &'a CellMotion,
-    /// Numbers per output line: 4 (force), 8 (with one torque for both bodies), 12 (with one for each), then the ledger's.
+    /// Numbers per output line: 4 (force), 6 (with one torque for both bodies), 12 (with one for each), then the ledger's.
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
@@ -174,15 +174,15 @@ impl PairPass {
         columns
     }
 
-    /// Numbers per output line that this law needs.
+    /// Numbers per output line that force and torques need.
     #[must_use]
-    pub fn stride(&self) -> usize {
+    pub fn width(&self) -> usize {
         match (self.bodies, self.laws.is_tangential()) {
             (Bodies::Ellipsoids, _) => 12,
             _ if self.rolling.is_some() => 12,
             (_, false) => 4,
             (Bodies::Spheres, true) => 12,
-            (Bodies::EqualSpheres, true) => 8,
+            (Bodies::EqualSpheres, true) => 6,
         }
     }
 

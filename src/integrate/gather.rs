@@ -10,7 +10,7 @@ use crate::force::pass::LEDGER_STRIDE;
 /// Output lines of the contact passes as the particles of one chunk see them.
 #[derive(Debug)]
 pub struct Lines<'a> {
-    /// Numbers per line that hold force and torques: 4, 8 or 12.
+    /// Numbers per line that hold force and torques: 4, 6 or 12.
     pub width: usize,
     /// Numbers per line, with the ledger's.
     pub stride: usize,
@@ -26,36 +26,39 @@ pub struct Lines<'a> {
 
 impl Lines<'_> {
     /// Sums over the contacts of consecutive particles, in lanes four wide: force \[N\], torque about the centre
-    /// \[N m\], the fourth number of each without meaning.
+    /// \[N m\], the fourth number of each without meaning. First those of which the particle is the second, whose
+    /// forces are subtracted, then the others; the partners' ids rise in each and from the first to the second.
     #[inline(always)]
     pub fn sum_all<L: Lane>(&mut self, chunk: &ChunkEnds, loads: &mut [[f64; 8]; CHUNK]) {
-        match (self.width, self.stride) {
-            (4, 4) => self.sums::<L, 4, 4>(chunk, loads),
-            (8, 8) => self.sums::<L, 8, 8>(chunk, loads),
-            (12, 12) => self.sums::<L, 12, 12>(chunk, loads),
-            (4, _) => self.sums::<L, 4, { 4 + LEDGER_STRIDE }>(chunk, loads),
-            (8, _) => self.sums::<L, 8, { 8 + LEDGER_STRIDE }>(chunk, loads),
-            _ => self.sums::<L, 12, { 12 + LEDGER_STRIDE }>(chunk, loads),
+        const { assert!(LEDGER_STRIDE == 8) };
+        match self.stride {
+            4 => self.fetch::<4>(),
+            6 => self.fetch::<6>(),
+            12 => self.fetch::<12>(),
+            14 => self.fetch::<14>(),
+            _ => self.fetch::<20>(),
+        }
+        match self.width {
+            4 => self.sums::<L, 4>(chunk, loads),
+            6 => self.sums::<L, 6>(chunk, loads),
+            _ => self.sums::<L, 12>(chunk, loads),
         }
     }
 
     #[inline(always)]
-    fn sums<L: Lane, const WIDTH: usize, const STRIDE: usize>(
-        &mut self,
-        chunk: &ChunkEnds,
-        loads: &mut [[f64; 8]; CHUNK],
-    ) {
+    fn sums<L: Lane, const WIDTH: usize>(&self, chunk: &ChunkEnds, loads: &mut [[f64; 8]; CHUNK]) {
+        let numbers = &self.buffer[..chunk.room()];
+        sum_side::<L, WIDTH, true>(chunk, numbers, loads);
+        sum_side::<L, WIDTH, false>(chunk, numbers, loads);
+    }
+
+    /// Copy the kept lines behind the ring.
+    #[inline(always)]
+    fn fetch<const STRIDE: usize>(&mut self) {
         let lines = self.buffer.as_chunks_mut::<STRIDE>().0;
         let kept = self.kept.as_chunks::<STRIDE>().0;
         for (slot, line) in lines[self.ring..].iter_mut().zip(self.reads) {
             *slot = kept[*line as usize];
-        }
-        let numbers = lines[..chunk.slots()].as_flattened();
-        // From memory, not known to the compiler: its way of making signs of bits is longer.
-        let signs = std::hint::black_box([1.0, 0.0, 0.0, 0.0, -1.0]);
-        for (place, ends) in chunk.in_order() {
-            // SAFETY: every end names a slot of the chunk's, and `numbers` holds them all.
-            loads[place % CHUNK] = unsafe { sum::<L, WIDTH, STRIDE>(ends, &signs, numbers) };
         }
     }
 
@@ -66,7 +69,7 @@ impl Lines<'_> {
         // the work of body forces between the first two.
         const TO: [usize; CONTACT_LEDGER] = [0, 2, 3, 4, 5, 6];
         for end in ends.iter().filter(|end| !end.is_second()) {
-            let entries = &self.buffer[end.number() * self.stride + self.width..][..CONTACT_LEDGER];
+            let entries = &self.buffer[end.place::<false>() + self.width..][..CONTACT_LEDGER];
             for (value, to) in entries.iter().zip(TO) {
                 ledger[to] += value;
             }
@@ -74,58 +77,85 @@ impl Lines<'_> {
     }
 }
 
-/// Sum over the contacts of one particle.
-///
-/// # Safety
-/// `numbers` holds `STRIDE` numbers for every slot up to those that the ends name.
+/// Sums over the ends of one side of all particles of a chunk: of seconds from zero on, of firsts on what is there.
 #[inline(always)]
-unsafe fn sum<L: Lane, const WIDTH: usize, const STRIDE: usize>(
-    ends: &[End],
-    signs: &[f64; 5],
+fn sum_side<L: Lane, const WIDTH: usize, const SECOND: bool>(
+    chunk: &ChunkEnds,
     numbers: &[f64],
-) -> [f64; 8] {
-    // SAFETY: as the function's.
-    let few = |ends: &[End]| unsafe { sum_few::<L, WIDTH, STRIDE>(ends, signs, numbers) };
-    // The numbers are written out, so that the loop over the few ends of most particles is.
-    let [force, torque] = match ends.len() {
-        3 => few(&ends[..3]),
-        4 => few(&ends[..4]),
-        5 => few(&ends[..5]),
-        6 => few(&ends[..6]),
-        7 => few(&ends[..7]),
-        8 => few(&ends[..8]),
-        9 => few(&ends[..9]),
-        _ => few(ends),
-    };
-    let mut load = [0.0; 8];
-    force.store(&mut load[..4]);
-    torque.store(&mut load[4..]);
-    load
-}
-
-/// See [`sum`].
-///
-/// # Safety
-/// As [`sum`].
-#[inline(always)]
-unsafe fn sum_few<L: Lane, const WIDTH: usize, const STRIDE: usize>(
-    ends: &[End],
-    signs: &[f64; 5],
-    numbers: &[f64],
-) -> [L; 2] {
-    const { assert!(WIDTH <= STRIDE) };
-    let (mut force, mut torque) = (L::splat(0.0), L::splat(0.0));
-    for end in ends {
-        let line = end.number() * STRIDE;
-        // SAFETY: as the function's; all that is read lies within the line's `WIDTH` numbers.
-        let four = |start: usize| unsafe { L::load(numbers.get_unchecked(line + start..line + start + 4)) };
-        force = force + L::splat(signs[end.side()]) * four(0);
-        if WIDTH == 8 {
-            torque = torque + four(4);
-        }
-        if WIDTH == 12 {
-            torque = torque + four(4 + end.side());
+    loads: &mut [[f64; 8]; CHUNK],
+) {
+    for (count, group) in chunk.visits(SECOND).groups().enumerate() {
+        // The numbers are written out, so that the loop over the few ends of most particles is.
+        match count {
+            0 => sum_group::<L, WIDTH, SECOND, 0>(chunk, group, numbers, loads),
+            1 => sum_group::<L, WIDTH, SECOND, 1>(chunk, group, numbers, loads),
+            2 => sum_group::<L, WIDTH, SECOND, 2>(chunk, group, numbers, loads),
+            3 => sum_group::<L, WIDTH, SECOND, 3>(chunk, group, numbers, loads),
+            4 => sum_group::<L, WIDTH, SECOND, 4>(chunk, group, numbers, loads),
+            5 => sum_group::<L, WIDTH, SECOND, 5>(chunk, group, numbers, loads),
+            6 => sum_group::<L, WIDTH, SECOND, 6>(chunk, group, numbers, loads),
+            7 => sum_group::<L, WIDTH, SECOND, 7>(chunk, group, numbers, loads),
+            8 => sum_group::<L, WIDTH, SECOND, 8>(chunk, group, numbers, loads),
+            _ => {
+                for place in group {
+                    let load = &mut loads[usize::from(*place) % CHUNK];
+                    let ends = chunk.of_side(usize::from(*place), SECOND);
+                    // SAFETY: no line of an end reaches beyond the chunk's room, which `numbers` is.
+                    unsafe { sum::<L, WIDTH, SECOND>(ends, numbers, load) };
+                }
+            }
         }
     }
-    [force, torque]
+}
+
+/// Sums over the ends of one side of particles that have `COUNT` of them.
+#[inline(always)]
+fn sum_group<L: Lane, const WIDTH: usize, const SECOND: bool, const COUNT: usize>(
+    chunk: &ChunkEnds,
+    group: &[u8],
+    numbers: &[f64],
+    loads: &mut [[f64; 8]; CHUNK],
+) {
+    if COUNT == 0 && !SECOND {
+        return;
+    }
+    for place in group {
+        let place = usize::from(*place);
+        // SAFETY: the place is one of this group's; no line of an end reaches beyond the chunk's room, which `numbers` is.
+        unsafe {
+            let ends = chunk.written_out::<SECOND, COUNT>(place);
+            sum::<L, WIDTH, SECOND>(ends, numbers, &mut loads[place % CHUNK]);
+        }
+    }
+}
+
+/// Sum over the ends of one side of one particle.
+///
+/// # Safety
+/// `numbers` holds the lines of the ends.
+#[inline(always)]
+unsafe fn sum<L: Lane, const WIDTH: usize, const SECOND: bool>(ends: &[End], numbers: &[f64], load: &mut [f64; 8]) {
+    // Of lines of six the last four are read, so that the torque lies in the last three lanes.
+    let first_torque = if WIDTH == 6 { 3 } else { 4 };
+    let from = match (WIDTH, SECOND) {
+        (6, _) => 2,
+        (12, true) => 8,
+        _ => 4,
+    };
+    let (mut force, mut torque) = if SECOND {
+        (L::splat(0.0), L::splat(0.0))
+    } else {
+        (L::load(&load[..4]), L::load(&load[first_torque..]))
+    };
+    for end in ends {
+        let line = end.place::<SECOND>();
+        // SAFETY: as the function's; all that is read lies within the line's `WIDTH` numbers.
+        let four = |start: usize| unsafe { L::load(numbers.get_unchecked(line + start..line + start + 4)) };
+        force = if SECOND { force - four(0) } else { force + four(0) };
+        if WIDTH > 4 {
+            torque = torque + four(from);
+        }
+    }
+    force.store(&mut load[..4]);
+    torque.store(&mut load[first_torque..]);
 }

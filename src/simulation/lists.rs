@@ -2,7 +2,7 @@
 //! skin, and inside it the contact list with a thin one.
 
 use super::{Model, Simulation, Stage};
-use crate::contact::ends::MAX_LINES;
+use crate::contact::ends::End;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::force::pass::PairPass;
@@ -161,12 +161,12 @@ impl Simulation {
         self.budget.reference_sides = sides;
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
-        let mut lines = [self.contacts.lines as f64];
-        self.comm.max_f64(&mut lines);
-        if lines[0] > MAX_LINES as f64 {
+        let mut largest = [self.contacts.largest_number() as f64, self.contacts.lines as f64];
+        self.comm.max_f64(&mut largest);
+        if largest[0] > End::MAX as f64 {
             return Err(Error::Input(format!(
-                "{} contacts listed on one rank are more than it can number ({MAX_LINES}); start more ranks",
-                lines[0]
+                "{} contacts listed on one rank are more than it can number; start more ranks",
+                largest[1]
             )));
         }
         self.lines.fit(&self.contacts);

@@ -67,10 +67,15 @@ pub struct Model {
 }
 
 impl Model {
-    /// Numbers per output line: the widest law's.
+    /// Numbers per output line that hold force and torques: the widest law's.
+    fn line_width(&self) -> usize {
+        self.passes.iter().map(PairPass::width).max().unwrap_or(4)
+    }
+
+    /// Numbers per output line.
     #[must_use]
-    pub fn stride(&self) -> usize {
-        self.passes.iter().map(PairPass::stride).max().unwrap_or(4)
+    pub fn line_stride(&self) -> usize {
+        self.line_width() + if self.config.output.energy_ledger { LEDGER_STRIDE } else { 0 }
     }
 
     /// What of particles is followed beside their motion.
@@ -146,9 +151,7 @@ impl Simulation {
         memory: ContactMemory,
         threads: usize,
     ) -> Result<Self> {
-        let width = model.stride();
-        let stride = width + if model.config.output.energy_ledger { LEDGER_STRIDE } else { 0 };
-        let lines = LineBuffers::new(width, stride);
+        let lines = LineBuffers::new(model.line_width(), model.line_stride());
         let mut simulation = Self {
             comm,
             decomposition,

@@ -46,12 +46,12 @@ impl LineBuffers {
 
     /// Make room for the lines of a list; what is there is overwritten by the next pass.
     pub fn fit(&mut self, list: &ContactList) {
-        let cache_lines = |lines: usize| (lines * self.stride).div_ceil(size_of::<CacheLine>() / size_of::<f64>());
+        let cache_lines = |numbers: usize| numbers.div_ceil(size_of::<CacheLine>() / size_of::<f64>());
         let zero = CacheLine([0.0; BLOCK]);
-        self.kept.resize(cache_lines(list.kept), zero);
+        self.kept.resize(cache_lines(list.kept * self.stride), zero);
         self.rings.resize_with(list.strips.len(), Ring::default);
         for (ring, strip) in self.rings.iter_mut().zip(&list.strips) {
-            ring.lines.resize(cache_lines(strip.slots()), zero);
+            ring.lines.resize(cache_lines(strip.room()), zero);
         }
     }
 }
@@ -312,10 +312,9 @@ struct View<'a> {
 impl View<'_> {
     /// Ask for what the sums of these particles read beside the lines, so that it is there after their contacts.
     fn ask_for_ends(&self, particles: &Range<usize>) {
-        let (offsets, ends, summing) = self.list.arrays();
+        let (offsets, ends) = self.list.arrays();
         let [first, last] = [particles.start, particles.end].map(|particle| offsets[particle] as usize);
         prefetch(ends, first, last - first);
-        prefetch(summing, particles.start, CHUNK);
         prefetch(offsets, particles.end, 2 * CHUNK);
     }
 

@@ -246,6 +246,30 @@ impl Lane for F64x4 {
         }
     }
     #[inline(always)]
+    fn scatter_six(values: [Self; 6], rows: &mut [f64], stride: usize) {
+        let [a, b, c, d, e, f] = values;
+        if stride != 6 {
+            Self::scatter([a, b, c, d], rows, stride, 0);
+            Self::scatter([c, d, e, f], rows, stride, 2);
+            return;
+        }
+        // The four rows are one run of 24 numbers.
+        let rows = &mut rows[..24];
+        // SAFETY: the processor has AVX2 (head of this file); the slice holds 24 numbers.
+        unsafe {
+            let [low, high] = [
+                [_mm256_unpacklo_pd(a.0, b.0), _mm256_unpacklo_pd(c.0, d.0), _mm256_unpacklo_pd(e.0, f.0)],
+                [_mm256_unpackhi_pd(a.0, b.0), _mm256_unpackhi_pd(c.0, d.0), _mm256_unpackhi_pd(e.0, f.0)],
+            ];
+            let pairs = [[low[0], low[1]], [low[2], high[0]], [high[1], high[2]]];
+            for (k, [first, second]) in pairs.into_iter().enumerate() {
+                let start = rows.as_mut_ptr().add(4 * k);
+                _mm256_storeu_pd(start, _mm256_permute2f128_pd::<0x20>(first, second));
+                _mm256_storeu_pd(start.add(12), _mm256_permute2f128_pd::<0x31>(first, second));
+            }
+        }
+    }
+    #[inline(always)]
     fn gather_shapes(shapes: &[Shape], offsets: &[u32]) -> [Self; SHAPE] {
         let offsets = &offsets[..4];
         let row = |k: usize| -> &[f64; SHAPE] { bytemuck::cast_ref(&shapes[offsets[k] as usize / RECORD]) };

@@ -12,8 +12,8 @@ use crate::force::touches::BlockTouches;
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
-    /// Lines, `stride` numbers each: `{F, 0, T, 0}`, F the force on the first, T the torque on each of two spheres of
-    /// equal radii; otherwise `{F, 0, T_first, 0, T_second, 0}`; then the ledger's
+    /// Lines, `stride` numbers each: `{F, 0}`, F the force on the first, without torques; `{F, T}`, T the torque on each
+    /// of two spheres of equal radii; otherwise `{F, 0, T_first, 0, T_second, 0}`; then the ledger's
     /// `{cell, driven, damping, viscous, friction, plastic, 0, 0}`.
     pub values: &'a mut [f64],
     /// Number of the first block's first line, a multiple of eight.
@@ -84,23 +84,25 @@ impl LineForm {
         // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
         let tangential = only(of.alive, of.tangential_force);
         let force = sub(tangential, scale(of.normal, L::select(of.alive, of.normal_force, zero)));
-        L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
-        if own >= 8 {
-            let turning = cross(of.normal, tangential);
-            let arms = touches.arms::<L>(lane, self.bodies == Bodies::EqualSpheres);
-            let mut first = scale(turning, arms[0]);
-            if self.rolling {
-                first = add(first, only(of.alive, touches.rolling::<L>(lane).value));
-            }
-            L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
-            if own >= 12 {
-                let mut second = scale(turning, arms[1]);
-                if self.rolling {
-                    second = sub(second, only(of.alive, touches.rolling::<L>(lane).value));
-                }
-                L::scatter([second[0], second[1], second[2], zero], rows, stride, 8);
-            }
+        if own == 4 {
+            L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
+            return force;
         }
+        let turning = cross(of.normal, tangential);
+        let arms = touches.arms::<L>(lane, self.bodies == Bodies::EqualSpheres);
+        let mut first = scale(turning, arms[0]);
+        if own == 6 {
+            L::scatter_six([force[0], force[1], force[2], first[0], first[1], first[2]], rows, stride);
+            return force;
+        }
+        let mut second = scale(turning, arms[1]);
+        if self.rolling {
+            let moment = only(of.alive, touches.rolling::<L>(lane).value);
+            (first, second) = (add(first, moment), sub(second, moment));
+        }
+        L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
+        L::scatter([first[0], first[1], first[2], zero], rows, stride, 4);
+        L::scatter([second[0], second[1], second[2], zero], rows, stride, 8);
         force
     }
 

@@ -52,7 +52,7 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> Left {
         gradient: [0.0, 0.0, -0.5],
         wall_velocity: [0.0; 3],
     };
-    let stride = pass.stride() + if ledger { LEDGER_STRIDE } else { 0 };
+    let stride = pass.width() + if ledger { LEDGER_STRIDE } else { 0 };
     let input = PassInput { motion: &motion, stride, ledger, max_overlap_fraction: 0.5, time_step, simd };
     let mut records = records();
     let mut lines = vec![0.0; section.blocks() * BLOCK * stride];
@@ -73,7 +73,8 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> Left {
     for (place, line) in lines.chunks(stride).take(PAIRS).enumerate() {
         let mut memory = vec![0.0; columns];
         section.read_memory(place, &mut memory);
-        bits.extend(line[..3].iter().chain(&line[4..7]).chain(&memory).map(|value| value.to_bits()));
+        let torque = if pass.width() == 6 { &line[3..6] } else { &line[4..7] };
+        bits.extend(line[..3].iter().chain(torque).chain(&memory).map(|value| value.to_bits()));
     }
     let stiffness = [false, true].map(|sums| {
         let wanted = Wanted { sums, samples: false };
