@@ -46,6 +46,8 @@ pub fn force_floor(choice: &LawChoice) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dashpot {
     factor: f64,
+    /// The factor is not 0.
+    damps: bool,
 }
 
 impl Dashpot {
@@ -59,17 +61,17 @@ impl Dashpot {
             "wahn" => 2.0 * b * (4.0 / 3.0 * effective_modulus).sqrt(),
             _ => 0.0,
         };
-        Self { factor }
+        Self { factor, damps: factor != 0.0 }
     }
 
     /// Coefficient c \[N s/m\] at contact radius a \[m\] and effective mass \[kg\].
     #[inline(always)]
     #[must_use]
     pub fn coefficient<L: Lane>(&self, contact_radius: L, effective_mass: L) -> L {
-        if self.factor == 0.0 {
-            L::splat(0.0)
-        } else {
+        if self.damps {
             L::splat(self.factor) * (contact_radius * effective_mass).sqrt()
+        } else {
+            L::splat(0.0)
         }
     }
 }

@@ -139,12 +139,12 @@ impl<L: Lane> Relative<L> {
         }
     }
 
-    /// Add to the velocity what the cell's motion imposes.
+    /// Add to the velocity what the cell's motion imposes; `faces_move` as in `motion`.
     #[inline(always)]
-    pub fn follow_cell(&mut self, motion: &CellMotion) {
+    pub fn follow_cell(&mut self, motion: &CellMotion, faces_move: bool) {
         let [gx, gy, gz] = motion.gradient;
         let affine = [L::splat(gx) * self.branch[0], L::splat(gy) * self.branch[1], L::splat(gz) * self.branch[2]];
-        self.imposed_velocity = if motion.faces_move { add(affine, self.imposed_velocity) } else { affine };
+        self.imposed_velocity = if faces_move { add(affine, self.imposed_velocity) } else { affine };
         self.velocity = add(self.velocity, self.imposed_velocity);
     }
 }
@@ -213,7 +213,7 @@ pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], 
     if motion.faces_move || !shift::all_here(&codes[..L::WIDTH]) {
         pair.enter_images(codes, motion);
     }
-    pair.follow_cell(motion);
+    pair.follow_cell(motion, motion.faces_move);
     pair
 }
 

@@ -256,7 +256,8 @@ impl PairPass {
         let form = LineForm { stride, ledger, time_step, bodies: kind, rolling, walls };
         let mut output = Output { lines, form };
         let mut excess = None;
-        for start in blocks.clone().step_by(BATCH) {
+        let mut start = blocks.start;
+        while start < blocks.end {
             let blocks = start..(start + BATCH).min(blocks.end);
             if far {
                 let ahead = start + LIST_AHEAD;
@@ -281,6 +282,7 @@ impl PairPass {
                 }
             }
             output.lines.first += blocks.len() * BLOCK;
+            start = blocks.end;
         }
         excess
     }

@@ -4,7 +4,7 @@
 //! No closure here holds what works on lanes: the compiler does not always fit one into a function for vector
 //! instructions, and outside each of these would be a call (`tests/vector_code.rs`).
 
-use super::output::{Output, SphereLines};
+use super::output::{NARROW_LINE, Output, SphereLines};
 use crate::contact::section::CacheLine;
 use crate::force::composition::MAX_MEMORY;
 use crate::force::lane::{Lane, for_each_group};
@@ -111,7 +111,11 @@ impl<C: ContactLaw> Stages<C> {
             if let Some(rolling) = rolling {
                 rolling.evaluate(batch, C::MEMORY, C::LASTS);
             }
-            self.complete::<L, DETAILED>(batch, output);
+            if !DETAILED && output.form.is_narrow() {
+                self.complete::<L, DETAILED, true>(batch, output);
+            } else {
+                self.complete::<L, DETAILED, false>(batch, output);
+            }
         }
     }
 
@@ -146,13 +150,15 @@ impl<C: ContactLaw> Stages<C> {
         }
     }
 
+    /// `NARROW`: see [`super::output::LineForm::is_narrow`].
     #[inline(always)]
-    fn complete<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, output: &mut Output) {
+    fn complete<L: Lane, const DETAILED: bool, const NARROW: bool>(&self, batch: &mut LawBatch, output: &mut Output) {
         let zero = L::splat(0.0);
         let Output { lines, form } = output;
         for (block, touches) in batch.touches.iter_mut().enumerate() {
             let own = &mut batch.memory[block * batch.columns..][C::NORMAL_MEMORY..C::MEMORY];
-            let rows = if DETAILED { &mut [] } else { lines.block(block, form.stride) };
+            let stride = if NARROW { NARROW_LINE } else { form.stride };
+            let rows = if DETAILED { &mut [] } else { lines.block(block, stride) };
             for_each_group!(L, lane, {
                 let alive = touches.alive::<L>(lane);
                 if !DETAILED || L::any(alive) {
@@ -179,7 +185,12 @@ impl<C: ContactLaw> Stages<C> {
                             normal_force: response.normal_force,
                             tangential_force: response.tangential_force,
                         };
-                        form.write_spheres(&mut rows[lane * form.stride..], &spheres, touches, lane);
+                        let rows = &mut rows[lane * stride..];
+                        if NARROW {
+                            spheres.write_narrow(rows, touches, lane);
+                        } else {
+                            form.write_spheres(rows, &spheres, touches, lane);
+                        }
                     }
                 }
             });

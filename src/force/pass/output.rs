@@ -9,6 +9,9 @@ use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
 use crate::force::touches::BlockTouches;
 
+/// Numbers of a line with a force and one torque.
+pub const NARROW_LINE: usize = 6;
+
 /// Where the output lines of some blocks go: line `n` to place `n mod capacity` of the buffer.
 #[derive(Debug)]
 pub struct LineRing<'a> {
@@ -69,7 +72,32 @@ pub struct SphereLines<L: Lane> {
     pub tangential_force: Vector<L>,
 }
 
+impl<L: Lane> SphereLines<L> {
+    /// Forces on the firsts \[N\], and tangential forces, 0 where no law was asked.
+    #[inline(always)]
+    fn forces(&self) -> [Vector<L>; 2] {
+        // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
+        let tangential = only(self.alive, self.tangential_force);
+        let normal_force = L::select(self.alive, self.normal_force, L::splat(0.0));
+        [sub(tangential, scale(self.normal, normal_force)), tangential]
+    }
+
+    /// Lines of `L::WIDTH` pairs of equal spheres from `lane` of their block on, where [`LineForm::is_narrow`].
+    #[inline(always)]
+    pub fn write_narrow(&self, rows: &mut [f64], touches: &BlockTouches, lane: usize) {
+        let [[fx, fy, fz], tangential] = self.forces();
+        let [tx, ty, tz] = scale(cross(self.normal, tangential), touches.arms::<L>(lane, true)[0]);
+        L::scatter_six([fx, fy, fz, tx, ty, tz], rows, NARROW_LINE);
+    }
+}
+
 impl LineForm {
+    /// Lines hold a force and one torque, nothing else.
+    #[must_use]
+    pub fn is_narrow(&self) -> bool {
+        self.stride == NARROW_LINE
+    }
+
     /// Forces and torques of `L::WIDTH` pairs of spheres from `lane` of their block on; gives the forces.
     #[inline(always)]
     pub fn write_spheres<L: Lane>(
@@ -81,9 +109,7 @@ impl LineForm {
     ) -> Vector<L> {
         let zero = L::splat(0.0);
         let (stride, own) = (self.stride, self.width());
-        // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
-        let tangential = only(of.alive, of.tangential_force);
-        let force = sub(tangential, scale(of.normal, L::select(of.alive, of.normal_force, zero)));
+        let [force, tangential] = of.forces();
         if own == 4 {
             L::scatter([force[0], force[1], force[2], zero], rows, stride, 0);
             return force;
@@ -91,7 +117,7 @@ impl LineForm {
         let turning = cross(of.normal, tangential);
         let arms = touches.arms::<L>(lane, self.bodies == Bodies::EqualSpheres);
         let mut first = scale(turning, arms[0]);
-        if own == 6 {
+        if own == NARROW_LINE {
             L::scatter_six([force[0], force[1], force[2], first[0], first[1], first[2]], rows, stride);
             return force;
         }

@@ -8,7 +8,7 @@ use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
-use crate::force::touches::{BATCH, BlockTouches};
+use crate::force::touches::{BATCH, BlockTouches, Content};
 use crate::state::particles::RECORD;
 
 /// Geometry of some blocks of sphere pairs, and the first contact that overlaps too much or is not a number. `EQUAL`: all
@@ -22,8 +22,13 @@ pub(super) fn geometry<const EQUAL: bool>(source: &Source, touches: &mut [BlockT
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         Simd::Avx2 => unsafe { geometry_avx2::<EQUAL>(source, touches) },
-        _ => geometry_of::<f64, EQUAL>(source, touches),
+        _ => geometry_scalar::<EQUAL>(source, touches),
     }
+}
+
+#[inline(never)]
+fn geometry_scalar<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
+    geometry_of::<f64, EQUAL>(source, touches)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -51,8 +56,9 @@ fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [Block
     for (((block, pair), codes), touches) in blocks.clone().zip(pairs.clone()).zip(codes).zip(touches.iter_mut()) {
         let ahead = block + RECORDS_AHEAD;
         if far && let (Some(first), Some(second)) = (first.get(ahead), second.get(ahead)) {
-            for (first, second) in first.iter().zip(second) {
-                prefetch(numbers, (*first).max(*second) as usize, RECORD);
+            let later: [u32; BLOCK] = std::array::from_fn(|place| first[place].max(second[place]));
+            for offset in later {
+                prefetch(numbers, offset as usize, RECORD);
             }
         }
         for_each_group!(L, lane, {
@@ -80,28 +86,14 @@ fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [Block
             });
         }
     }
-    let radius = records.first().map_or(0.0, |record| record.radius);
-    let limit = input.max_overlap_fraction;
-    let mut faulty = never;
-    for touches in &mut touches[..blocks.len()] {
-        for_each_group!(L, lane, {
-            let mut pair = touches.relative::<L>(lane);
-            if EQUAL {
-                pair.equal(radius);
-            }
-            pair.follow_cell(motion);
-            if content.detailed {
-                // Here already, so that no register has to hold them until the touch is known.
-                touches.put_details(lane, &pair.branch, &pair.imposed_velocity);
-            }
-            let pair = geometry::touch(&pair, unequal);
-            touches.put_touch::<L, EQUAL>(lane, &pair, content);
-            // Written so that NaN counts as a fault.
-            let beyond = (L::splat(limit) * pair.min_radius).not_at_least(pair.touch.overlap);
-            faulty = faulty | pair.touching & beyond;
-        });
-    }
-    if !L::any(faulty) {
+    let touches = &mut touches[..blocks.len()];
+    // Most runs have no walls that move, no memory that lasts and no ledger; without the questions the loop is shorter.
+    let faulty = if content.detailed || content.range != 0.0 || motion.faces_move {
+        touch_all::<L, EQUAL, false>(source, touches, unequal)
+    } else {
+        touch_all::<L, EQUAL, true>(source, touches, unequal)
+    };
+    if !faulty {
         return None;
     }
     (blocks.start * BLOCK..blocks.end * BLOCK).find_map(|place| {
@@ -109,7 +101,42 @@ fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [Block
         let pair = geometry::spheres::<f64>(records, pair, &section.shift[place..=place], motion);
         let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
         // Written so that NaN counts as a fault.
-        let within = overlap <= limit * radius;
+        let within = overlap <= input.max_overlap_fraction * radius;
         (pair.touching && !within).then_some((place, overlap / radius))
     })
+}
+
+/// From the bodies to the touches; gives whether one overlaps too much or is not a number. `PLAIN`: there are no details,
+/// faces do not move, and the law's memory ends with the touch.
+#[inline(always)]
+fn touch_all<L: Lane, const EQUAL: bool, const PLAIN: bool>(
+    source: &Source,
+    touches: &mut [BlockTouches],
+    unequal: bool,
+) -> bool {
+    let Source { input, bodies: BodyData { records, .. }, content, .. } = *source;
+    let content = if PLAIN { Content { detailed: false, range: 0.0, ..content } } else { content };
+    let (motion, faces_move) = (input.motion, !PLAIN && input.motion.faces_move);
+    let radius = records.first().map_or(0.0, |record| record.radius);
+    let limit = input.max_overlap_fraction;
+    let mut faulty = L::splat(0.0).greater(L::splat(0.0));
+    for touches in touches {
+        for_each_group!(L, lane, {
+            let mut pair = touches.relative::<L>(lane);
+            if EQUAL {
+                pair.equal(radius);
+            }
+            pair.follow_cell(motion, faces_move);
+            if content.detailed {
+                // Here already, so that no register has to hold them until the touch is known.
+                touches.put_details(lane, &pair.branch, &pair.imposed_velocity);
+            }
+            let pair = geometry::touch(&pair, !EQUAL && unequal);
+            touches.put_touch::<L, EQUAL>(lane, &pair, content);
+            // Written so that NaN counts as a fault.
+            let beyond = (L::splat(limit) * pair.min_radius).not_at_least(pair.touch.overlap);
+            faulty = faulty | pair.touching & beyond;
+        });
+    }
+    L::any(faulty)
 }
