@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Particles per chunk.
-pub const CHUNK: usize = 64;
+pub const CHUNK: usize = 128;
 
 /// Some blocks of a section, evaluated in one go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -255,34 +255,43 @@ impl PairPass {
         let content = Content { rolling, detailed, range: self.range() };
         let form = LineForm { stride, ledger, time_step, bodies: kind, rolling, walls };
         let mut output = Output { lines, form };
-        let mut excess = None;
-        let mut start = blocks.start;
-        while start < blocks.end {
-            let blocks = start..(start + BATCH).min(blocks.end);
+        let mut answer = |blocks: Range<usize>, touches: &mut [BlockTouches], memory: &mut [CacheLine]| {
             if far {
-                let ahead = start + LIST_AHEAD;
-                prefetch(&section.memory, ahead * columns, BATCH * columns);
-                prefetch(&section.first, ahead * BLOCK, BATCH * BLOCK);
-                prefetch(&section.second, ahead * BLOCK, BATCH * BLOCK);
-                prefetch(&section.shift, ahead * BLOCK, BATCH * BLOCK);
+                prefetch(memory, (blocks.start + LIST_AHEAD) * columns, BATCH * columns);
             }
-            let source = Source { input, bodies, section, blocks: blocks.clone(), content, normals: self.columns };
-            let found = geometry(&source, kind, touches);
-            excess = excess.or(found);
-            let touches = &mut touches[..blocks.len()];
-            let memory = &mut section.memory[blocks.start * columns..blocks.end * columns];
+            let memory = &mut memory[blocks.start * columns..blocks.end * columns];
             let mut batch = LawBatch { simd: input.simd, detailed, energies: ledger, touches, memory, columns };
             self.laws.evaluate(&mut batch, self.rolling.as_deref(), Some(&mut output));
             if detailed {
                 output.write(&mut batch, self.columns);
             }
+            output.lines.first += blocks.len() * BLOCK;
+        };
+        if !ellipsoids && !walls {
+            // The laws get the memory while the geometry goes on reading the rest of the section.
+            let mut memory = std::mem::take(&mut section.memory);
+            let source = Source { input, bodies, section, blocks, content, normals: self.columns };
+            let mut each = |blocks, touches: &mut _| answer(blocks, touches, &mut memory);
+            let excess = match kind {
+                Bodies::EqualSpheres => spheres::geometry::<true>(&source, touches, &mut each),
+                _ => spheres::geometry::<false>(&source, touches, &mut each),
+            };
+            section.memory = memory;
+            return excess;
+        }
+        let mut excess = None;
+        for start in blocks.clone().step_by(BATCH) {
+            let blocks = start..(start + BATCH).min(blocks.end);
+            let source = Source { input, bodies, section, blocks: blocks.clone(), content, normals: self.columns };
+            let found = geometry(&source, kind, touches);
+            excess = excess.or(found);
+            let touches = &mut touches[..blocks.len()];
+            answer(blocks.clone(), touches, &mut section.memory);
             if ellipsoids && !walls {
-                for (hint, touches) in section.hints[blocks.clone()].iter_mut().zip(batch.touches.iter()) {
+                for (hint, touches) in section.hints[blocks].iter_mut().zip(&*touches) {
                     *hint = touches.normals();
                 }
             }
-            output.lines.first += blocks.len() * BLOCK;
-            start = blocks.end;
         }
         excess
     }
@@ -334,14 +343,13 @@ impl PairPass {
     }
 }
 
-/// Touches of some blocks of such bodies.
-#[inline(always)]
+/// Touches of the blocks of a batch of such bodies.
 fn geometry(source: &Source, bodies: Bodies, touches: &mut [BlockTouches; BATCH]) -> Excess {
     match (source.section.partners, bodies) {
         (Partners::Wall, _) => walls::geometry(source, touches),
         (_, Bodies::Ellipsoids) => ellipsoids::geometry(source, touches),
-        (_, Bodies::EqualSpheres) => spheres::geometry::<true>(source, touches),
-        (_, Bodies::Spheres) => spheres::geometry::<false>(source, touches),
+        (_, Bodies::EqualSpheres) => spheres::geometry::<true>(source, touches, &mut |_, _| ()),
+        (_, Bodies::Spheres) => spheres::geometry::<false>(source, touches, &mut |_, _| ()),
     }
 }
 

@@ -19,7 +19,7 @@ use crate::state::shape::Shape;
 use std::ops::Range;
 
 /// How many particles ahead velocities and reference positions are asked for.
-const AHEAD: usize = 2 * CHUNK;
+const AHEAD: usize = 128;
 
 /// What is the same for all particles in one step.
 #[derive(Debug, Clone, Copy)]

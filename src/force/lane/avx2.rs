@@ -93,23 +93,25 @@ pub(super) unsafe fn relative_rows<const EQUAL: bool>(a: *const f64, b: *const f
 #[repr(C, packed)]
 struct Unaligned(__m128i);
 
-/// Where the records of four offsets begin.
+/// Where the records of the first four offsets of some lists begin.
 #[inline(always)]
-fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 4] {
-    let offsets: &[u32; 4] = offsets[..4].try_into().expect("four offsets");
+fn rows_of<const N: usize>(records: &[Record], lists: [&[u32]; N]) -> [[*const f64; 4]; N] {
+    let lists = lists.map(|offsets| <&[u32; 4]>::try_from(&offsets[..4]).expect("four offsets"));
     let count = u32::try_from(records.len() * RECORD).unwrap_or(u32::MAX);
     // SAFETY: the processor has AVX2 (head of this file). Volatile, so that the scalar loads of the same offsets below
     // stay loads: taking them out of the vector costs more.
     let inside = unsafe {
         let last = _mm_set1_epi32(count.saturating_sub(RECORD as u32).cast_signed());
-        let beyond = _mm_max_epu32(offsets.as_ptr().cast::<Unaligned>().read_volatile().0, last);
+        let mut beyond = last;
+        for offsets in lists {
+            beyond = _mm_max_epu32(beyond, offsets.as_ptr().cast::<Unaligned>().read_volatile().0);
+        }
         _mm_movemask_epi8(_mm_cmpeq_epi32(beyond, last))
     };
     assert!(inside == 0xffff && count > 0, "the contact list names particles that are not there");
     let start: *const f64 = records.as_ptr().cast();
-    // SAFETY: a whole record follows each of the four.
-    let row = |k: usize| unsafe { start.add(offsets[k] as usize) };
-    [row(0), row(1), row(2), row(3)]
+    // SAFETY: a whole record follows each offset.
+    lists.map(|offsets| offsets.map(|offset| unsafe { start.add(offset as usize) }))
 }
 
 /// Ask for the cache line at an address.
@@ -192,7 +194,7 @@ impl Lane for F64x4 {
     }
     #[inline(always)]
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
-        let row = rows_of(records, offsets);
+        let [row] = rows_of(records, [offsets]);
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX2 (head of this file); each row points at the twelve numbers of a
@@ -213,8 +215,8 @@ impl Lane for F64x4 {
         columns
     }
     #[inline(always)]
-    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let (first, second) = (rows_of(records, first), rows_of(records, second));
+    fn relative<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3] {
+        let [first, second] = rows_of(records, pairs);
         let mut rows = [[Self::splat(0.0).0; 4]; 3];
         for k in 0..4 {
             // SAFETY: the processor has AVX2 (head of this file); the rows point at records.
