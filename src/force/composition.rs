@@ -93,7 +93,7 @@ impl<N: NormalLaw, T: TangentialLaw> ContactLaw for Composition<N, T> {
             // Friction ends with the contact circle, though the normal law's memory goes on.
             tangential = tangential.only(joined);
             for value in memory {
-                *value = L::select(joined, *value, L::splat(0.0));
+                *value = value.only(joined);
             }
         }
         ContactResponse {

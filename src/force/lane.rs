@@ -67,6 +67,12 @@ pub trait Lane:
     }
     /// Lane by lane: `if mask { yes } else { no }` (a blend, never a product).
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Lane by lane: `if mask { self } else { 0 }`.
+    #[inline(always)]
+    #[must_use]
+    fn only(self, mask: Self::Mask) -> Self {
+        Self::select(mask, self, Self::splat(0.0))
+    }
     /// True in some lane.
     fn any(mask: Self::Mask) -> bool;
     /// Value of a mask in one lane.

@@ -121,7 +121,7 @@ impl<L: Lane> VectorResponse<L> {
     #[inline(always)]
     #[must_use]
     pub fn only(self, mask: L::Mask) -> Self {
-        let kept = |value| L::select(mask, value, L::splat(0.0));
+        let kept = |value: L| value.only(mask);
         let e = self.energies;
         Self {
             value: self.value.map(kept),

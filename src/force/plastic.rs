@@ -215,7 +215,7 @@ impl Plastic {
         let contact_radius = joined(peak.contact_radius * share);
 
         let dissipated = peak.work - L::splat(0.4) * peak.force * recovery;
-        let plastic_work = L::select(yielded, dissipated, zero);
+        let plastic_work = dissipated.only(yielded);
         let regime = |regime: Regime| L::splat(regime.number());
         let loads = overlap.at_least(memory[0]);
         let virgin = L::select(peak.fully_plastic, regime(Regime::Plastic), regime(Regime::ElasticPlastic));
@@ -223,7 +223,7 @@ impl Plastic {
         let touching = L::select(yielded, beyond, regime(Regime::Elastic));
         let before = memory[3];
         memory[0] = L::select(yielded, largest, zero.max(largest));
-        memory[1] = L::select(yielded, plastic_overlap, zero);
+        memory[1] = plastic_overlap.only(yielded);
         memory[2] = L::select(apart, regime(Regime::Apart), touching);
         memory[3] = plastic_work;
         // An elastic touch leaves nothing behind.

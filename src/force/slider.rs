@@ -57,7 +57,7 @@ impl<L: Lane> Turning<L> {
         let lost = (tilt + self.angle * self.angle * (tilt - one)).max(-one);
         let stretch = one + lost * (L::splat(0.5) + lost * (L::splat(0.375) + lost * L::splat(0.3125)));
         let kept = (stiffness * (square * inverse)).min(one);
-        [along, L::select(both.greater(zero), stretch * kept, zero)]
+        [along, (stretch * kept).only(both.greater(zero))]
     }
 }
 
@@ -126,5 +126,5 @@ pub fn kept_share<L: Lane>(stiffness: L, last: L) -> L {
 pub fn stiffness_loss<L: Lane>(before: L, last: L, after: L, stiffness: L) -> L {
     let zero = L::splat(0.0);
     let loss = L::splat(0.5) * (before / last - after / stiffness);
-    L::select(last.greater(zero), loss, zero)
+    loss.only(last.greater(zero))
 }

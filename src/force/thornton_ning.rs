@@ -223,7 +223,7 @@ impl NormalLaw for ThorntonNing {
         let stretch = L::select(yielded, stretch, one);
         let branch_y = top_y / root;
         let recovery = overlap_scale * root * (branch_y * branch_y * branch_y * branch_y - branch_y);
-        let plastic_overlap = L::select(yielded, top - recovery, zero);
+        let plastic_overlap = (top - recovery).only(yielded);
         let energy_scale = force_scale * overlap_scale * stretch * root * touch.overlap_factor;
 
         // The neck now.
@@ -236,10 +236,10 @@ impl NormalLaw for ThorntonNing {
         let spring = joined(force_scale * stretch * force(y));
         let contact_radius = joined(radius_scale * root * root * y * y);
         let held = joined(energy_scale * energy(y));
-        let broken = L::select(was_joined & apart, energy_scale * energy(L::splat(LAST_Y)), zero);
+        let broken = (energy_scale * energy(L::splat(LAST_Y))).only(was_joined & apart);
 
         let dissipated = force_scale * overlap_scale * touch.overlap_factor * work - energy_scale * energy(branch_y);
-        let plastic_work = L::select(yielded, dissipated, zero);
+        let plastic_work = dissipated.only(yielded);
         let regime = |regime: Regime| L::splat(regime.number());
         let beyond = L::select(touch.overlap.at_least(memory[0]), regime(Regime::Plastic), regime(Regime::Unloading));
         let before = memory[3];

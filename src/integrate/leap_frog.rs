@@ -280,7 +280,7 @@ fn move_all<L: Lane, const TURN: bool>(
         let inverse_mass = L::splat(numbers[11]);
         let mut acceleration = force * inverse_mass;
         if falls {
-            acceleration = acceleration + L::select(inverse_mass.greater(zero), gravity, zero);
+            acceleration = acceleration + gravity.only(inverse_mass.greater(zero));
         }
         let mut half_velocity = L::load(velocity) + kick * acceleration;
         let mut position = scale * L::load(&numbers[..4]) + drift * half_velocity;

@@ -264,7 +264,7 @@ impl<L: Lane> EllipsoidTouch<L> {
     fn numbers(&self) -> [L; NUMBERS] {
         let PairTouch { touching, touch: t, branch, imposed_velocity: v, arm_first, arm_second, min_radius } =
             self.pair;
-        let flag = L::select(touching, L::splat(1.0), L::splat(0.0));
+        let flag = L::splat(1.0).only(touching);
         let [r, s] = self.arms;
         let (n, slip, spin) = (t.normal, t.slip_velocity, t.relative_spin);
         #[rustfmt::skip]

@@ -183,6 +183,11 @@ impl Lane for F64x4 {
         Self(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
     }
     #[inline(always)]
+    fn only(self, mask: Mask4) -> Self {
+        // SAFETY: the processor has AVX2 (head of this file). Masks are all ones or all zeros in each lane.
+        Self(unsafe { _mm256_and_pd(self.0, mask.0) })
+    }
+    #[inline(always)]
     fn any(mask: Mask4) -> bool {
         // SAFETY: the processor has AVX2 (head of this file).
         unsafe { _mm256_movemask_pd(mask.0) != 0 }

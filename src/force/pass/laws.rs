@@ -280,7 +280,7 @@ fn load<L: Lane>(values: &mut [L], memory: &[CacheLine], lane: usize) {
 #[inline(always)]
 fn keep<L: Lane>(values: &[L], memory: &mut [CacheLine], lane: usize, alive: L::Mask) {
     for (value, column) in values.iter().zip(memory) {
-        L::select(alive, *value, L::splat(0.0)).store(&mut column.0[lane..]);
+        value.only(alive).store(&mut column.0[lane..]);
     }
 }
 

@@ -78,7 +78,7 @@ impl<L: Lane> SphereLines<L> {
     fn forces(&self) -> [Vector<L>; 2] {
         // Normals and arms are numbers in every lane, so that what they multiply may be blended before.
         let tangential = only(self.alive, self.tangential_force);
-        let normal_force = L::select(self.alive, self.normal_force, L::splat(0.0));
+        let normal_force = self.normal_force.only(self.alive);
         [sub(tangential, scale(self.normal, normal_force)), tangential]
     }
 
@@ -163,11 +163,11 @@ impl LineForm {
         let alive = touches.alive::<L>(lane);
         // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
         let work = dot(*force, touches.imposed_velocity(lane)) * L::splat(self.time_step);
-        let work = L::select(alive, work, zero);
+        let work = work.only(alive);
         let (cell, driven) = if self.walls { (zero, work) } else { (work, zero) };
         let e = touches.response::<L>(lane).energies;
         let [damping, viscous, friction] = only(alive, [e.damping, e.viscous, e.friction]);
-        let plastic = L::select(alive, e.plastic, zero);
+        let plastic = e.plastic.only(alive);
         let (stride, own) = (self.stride, self.width());
         L::scatter([cell, driven, damping, viscous], rows, stride, own);
         L::scatter([friction, plastic, zero, zero], rows, stride, own + 4);
@@ -236,6 +236,5 @@ impl Output<'_> {
 /// A vector where `mask` holds, 0 elsewhere.
 #[inline(always)]
 fn only<L: Lane>(mask: L::Mask, v: Vector<L>) -> Vector<L> {
-    let zero = L::splat(0.0);
-    [L::select(mask, v[0], zero), L::select(mask, v[1], zero), L::select(mask, v[2], zero)]
+    [v[0].only(mask), v[1].only(mask), v[2].only(mask)]
 }
