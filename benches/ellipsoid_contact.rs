@@ -72,7 +72,8 @@ impl Scene {
         let surroundings = Surroundings { motion, range: 0.0, simd };
         let mut touches = BlockTouches::zeroed();
         let Self { records, shapes, section, .. } = self;
-        BlockSource { surroundings: &surroundings, records, shapes, section, block, normals: 0 }.fill(&mut touches);
+        let pairs = section.pairs(records);
+        BlockSource { surroundings: &surroundings, pairs: &pairs, shapes, section, block, normals: 0 }.fill(&mut touches);
         touches
     }
 

@@ -143,7 +143,7 @@ impl BuildContext {
                     section.set(place, index as u32, wall, shift::encode([0; 3]));
                     // Both lists are in order of particle and wall.
                     let (before, cursor) = &mut old[pair];
-                    let key = |place: usize| (before.first_of(place), before.second[place]);
+                    let key = |place: usize| (before.first_of(place), before.wall_of(place));
                     while *cursor < before.count && key(*cursor) < (index, wall) {
                         *cursor += 1;
                     }

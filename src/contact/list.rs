@@ -217,7 +217,7 @@ impl ContactList {
         let section = &self.sections[section];
         let low = particles.id[section.first_of(place)];
         let (high, shift) = if section.partners == Partners::Wall {
-            (total + section.second[place], [0; 3])
+            (total + section.wall_of(place), [0; 3])
         } else {
             (particles.id[section.second_of(place)], shift::decode(section.shift[place]))
         };
@@ -344,7 +344,7 @@ impl ContactList {
             for (line, place) in (run.line as usize..).zip(places) {
                 let first = section.first_of(place);
                 if section.partners == Partners::Wall {
-                    place_end(first, order_key(total + section.second[place], [0; 3], false), End::new(line, false));
+                    place_end(first, order_key(total + section.wall_of(place), [0; 3], false), End::new(line, false));
                 } else {
                     let second = section.second_of(place);
                     let shift = shift::decode(section.shift[place]);

@@ -1,8 +1,9 @@
 //! Contacts of one pair of materials in blocks, with their memory.
 
 use super::shift;
-use crate::state::particles::RECORD;
+use crate::state::particles::{RECORD, Record};
 use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// Contacts per block: the widest lanes.
 pub const BLOCK: usize = 8;
@@ -43,9 +44,11 @@ pub struct Section {
     pub origin: usize,
     /// The particle with the lower global id: its index times [`RECORD`], where its record begins in the array of
     /// numbers, so that the contact pass has nothing to compute.
-    pub first: Vec<u32>,
+    first: Vec<u32>,
     /// The other particle likewise (or the number of the wall).
-    pub second: Vec<u32>,
+    second: Vec<u32>,
+    /// No entry of `first` and, but for walls, of `second` is larger.
+    highest: u32,
     /// Packed image shift of the second.
     pub shift: Vec<u16>,
     /// Memory columns of this pair's law.
@@ -68,6 +71,7 @@ impl Section {
             origin,
             first: Vec::new(),
             second: Vec::new(),
+            highest: 0,
             shift: Vec::new(),
             columns,
             memory: Vec::new(),
@@ -93,6 +97,33 @@ impl Section {
         self.origin + self.second[place] as usize / RECORD
     }
 
+    /// Number of the wall of a contact with one.
+    #[must_use]
+    pub fn wall_of(&self, place: usize) -> u32 {
+        self.second[place]
+    }
+
+    /// Offsets of the firsts and of the seconds, padding included.
+    #[must_use]
+    pub fn offsets(&self) -> [&[u32]; 2] {
+        [&self.first, &self.second]
+    }
+
+    /// The pairs of particles, whose records from the section's origin on these are.
+    ///
+    /// # Panics
+    /// If there is no record for some particle, or if the section is of a wall.
+    #[inline]
+    #[must_use]
+    pub fn pairs<'a>(&'a self, records: &'a [Record]) -> Pairs<'a> {
+        assert!(self.partners != Partners::Wall, "a wall has no record");
+        let last = records.len().checked_sub(1);
+        let inside = last.is_some_and(|last| self.highest as usize <= last * RECORD);
+        assert!(inside || self.first.is_empty(), "the contact list names particles that are not there");
+        let (first, second) = (self.first.as_chunks().0, self.second.as_chunks().0);
+        Pairs { records, first, second, codes: self.shift.as_chunks().0 }
+    }
+
     /// Set the number of contacts. New places hold padding and zero memory; so do the places that were cut
     /// off within the last block.
     pub fn resize(&mut self, count: usize) {
@@ -112,8 +143,10 @@ impl Section {
     /// Make `place` a contact with zero memory; indices from the origin on, or the number of the wall.
     pub fn set(&mut self, place: usize, first: u32, second: u32, code: u16) {
         let unit = RECORD as u32;
+        let wall = self.partners == Partners::Wall;
         self.first[place] = first * unit;
-        self.second[place] = if self.partners == Partners::Wall { second } else { second * unit };
+        self.second[place] = if wall { second } else { second * unit };
+        self.highest = self.highest.max(if wall { first } else { first.max(second) } * unit);
         self.shift[place] = code;
         let start = place / BLOCK * self.columns;
         for line in &mut self.memory[start..start + self.columns] {
@@ -146,6 +179,100 @@ impl Section {
         for (value, line) in row.iter().zip(&mut self.memory[start..start + self.columns]) {
             line.0[place % BLOCK] = *value;
         }
+    }
+}
+
+/// The contacts of a section as pairs of records, all of which are there.
+#[derive(Debug, Clone, Copy)]
+pub struct Pairs<'a> {
+    records: &'a [Record],
+    first: &'a [[u32; BLOCK]],
+    second: &'a [[u32; BLOCK]],
+    codes: &'a [[u16; BLOCK]],
+}
+
+impl<'a> Pairs<'a> {
+    /// The records as numbers.
+    #[inline(always)]
+    #[must_use]
+    pub fn numbers(&self) -> &'a [f64] {
+        bytemuck::cast_slice(self.records)
+    }
+
+    /// Some blocks.
+    #[inline(always)]
+    #[must_use]
+    pub fn part(&self, blocks: Range<usize>) -> Self {
+        Self {
+            records: self.records,
+            first: &self.first[blocks.clone()],
+            second: &self.second[blocks.clone()],
+            codes: &self.codes[blocks],
+        }
+    }
+
+    /// One block.
+    #[inline(always)]
+    #[must_use]
+    pub fn block(&self, number: usize) -> BlockPairs<'a> {
+        let offsets = [&self.first[number], &self.second[number]];
+        BlockPairs { records: self.records, offsets, codes: &self.codes[number] }
+    }
+
+    /// Block by block.
+    #[inline(always)]
+    pub fn blocks(&self) -> impl Iterator<Item = BlockPairs<'a>> + Clone + use<'a> {
+        let records = self.records;
+        let lists = self.first.iter().zip(self.second).zip(self.codes);
+        lists.map(move |((first, second), codes)| BlockPairs { records, offsets: [first, second], codes })
+    }
+
+    /// Of each contact of a block, if there is one, the record that lies farther on in memory: its offset.
+    #[inline(always)]
+    #[must_use]
+    pub fn farther(&self, block: usize) -> Option<[u32; BLOCK]> {
+        let (first, second) = (self.first.get(block)?, self.second.get(block)?);
+        Some(std::array::from_fn(|place| first[place].max(second[place])))
+    }
+}
+
+/// The pairs of a block, all of whose records are there.
+#[derive(Debug, Clone, Copy)]
+pub struct BlockPairs<'a> {
+    records: &'a [Record],
+    offsets: [&'a [u32; BLOCK]; 2],
+    codes: &'a [u16; BLOCK],
+}
+
+impl<'a> BlockPairs<'a> {
+    /// The two records of a pair.
+    #[inline(always)]
+    #[must_use]
+    pub fn records(&self, place: usize) -> [&'a Record; 2] {
+        self.offsets.map(|offsets| &self.records[offsets[place] as usize / RECORD])
+    }
+
+    /// Where the records of `N` firsts and of `N` seconds begin, of the pairs from `place` on: addresses of [`RECORD`]
+    /// numbers each.
+    #[inline(always)]
+    #[must_use]
+    pub fn starts<const N: usize>(&self, place: usize) -> [[*const f64; N]; 2] {
+        let start: *const f64 = self.records.as_ptr().cast();
+        self.offsets.map(|offsets| std::array::from_fn(|k| start.wrapping_add(offsets[place + k] as usize)))
+    }
+
+    /// Offsets of the firsts and of the seconds.
+    #[inline(always)]
+    #[must_use]
+    pub fn offsets(&self) -> [&'a [u32; BLOCK]; 2] {
+        self.offsets
+    }
+
+    /// Packed image shifts of the seconds.
+    #[inline(always)]
+    #[must_use]
+    pub fn codes(&self) -> &'a [u16; BLOCK] {
+        self.codes
     }
 }
 

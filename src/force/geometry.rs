@@ -2,6 +2,7 @@
 
 use super::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
+use crate::contact::section::BlockPairs;
 use crate::contact::shift::{self, ShiftTable};
 use crate::state::particles::Record;
 
@@ -99,7 +100,7 @@ impl<L: Lane> PairTouch<L> {
 }
 
 impl<L: Lane> Relative<L> {
-    /// Some pairs of spheres at these offsets, in no image yet and without what the cell imposes; without
+    /// Pairs of spheres from `lane` of a block on, in no image yet and without what the cell imposes; without
     /// `relative_spin`, which between equal spheres only rolling laws need. `EQUAL`: all radii are, and those of the
     /// pair mean nothing, see [`Self::equal`].
     ///
@@ -107,9 +108,9 @@ impl<L: Lane> Relative<L> {
     /// PHYSICS.md section 1.
     #[inline(always)]
     #[must_use]
-    pub fn of<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> Self {
+    pub fn of<const EQUAL: bool>(pairs: &BlockPairs, lane: usize) -> Self {
         let [[x, y, z, radius_difference], [vx, vy, vz, radius_sum], [wx, wy, wz, inverse_masses]] =
-            L::relative::<EQUAL>(records, pairs);
+            L::relative::<EQUAL>(pairs, lane);
         Self {
             branch: [x, y, z],
             velocity: [vx, vy, vz],
@@ -203,12 +204,13 @@ pub fn touch<L: Lane>(pair: &Relative<L>, mixed: bool) -> PairTouch<L> {
     }
 }
 
-/// Some pairs of spheres at these offsets, the second ones in the images of their packed shifts, with what the cell
-/// imposes; without `relative_spin`.
+/// Pairs of spheres from `lane` of a block on, the second ones in the images of their packed shifts, with what the cell
+/// imposes.
 #[inline(always)]
 #[must_use]
-pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> Relative<L> {
-    let mut pair = Relative::of::<false>(records, pairs);
+pub fn relative<L: Lane>(pairs: &BlockPairs, lane: usize, motion: &CellMotion) -> Relative<L> {
+    let mut pair = Relative { relative_spin: L::relative_spin(pairs, lane), ..Relative::of::<false>(pairs, lane) };
+    let codes = &pairs.codes()[lane..];
     // Away from periodic faces there is nothing to look up.
     if motion.faces_move || !shift::all_here(&codes[..L::WIDTH]) {
         pair.enter_images(codes, motion);
@@ -217,12 +219,11 @@ pub fn relative<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], 
     pair
 }
 
-/// Touches of some pairs of spheres, see [`relative`].
+/// Touches of pairs of spheres, see [`relative`].
 #[inline(always)]
 #[must_use]
-pub fn spheres<L: Lane>(records: &[Record], pairs: [&[u32]; 2], codes: &[u16], motion: &CellMotion) -> PairTouch<L> {
-    let pair = Relative { relative_spin: L::relative_spin(records, pairs), ..relative(records, pairs, codes, motion) };
-    touch(&pair, true)
+pub fn spheres<L: Lane>(pairs: &BlockPairs, lane: usize, motion: &CellMotion) -> PairTouch<L> {
+    touch(&relative(pairs, lane, motion), true)
 }
 
 /// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves

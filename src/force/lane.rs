@@ -1,5 +1,6 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
+use crate::contact::section::BlockPairs;
 use crate::state::particles::{RECORD, Record};
 use crate::state::shape::{Number, Shape};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -80,12 +81,12 @@ pub trait Lane:
     /// The records of `WIDTH` particles that begin at these numbers of the slice (index times [`RECORD`]),
     /// transposed: entry `c` holds number `c` of each record.
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD];
-    /// What `WIDTH` pairs need of their records, transposed: position and radius, second minus first; velocity,
+    /// What `WIDTH` pairs from `place` of their block on need of their records, transposed: position and radius, second minus first; velocity,
     /// second minus first, and radius, both together; spin and 1/m, both together. `EQUAL`: all radii are, and what
     /// stands in the place of radii means nothing.
-    fn relative<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3];
-    /// Spin of the second less that of the first.
-    fn relative_spin(records: &[Record], pairs: [&[u32]; 2]) -> [Self; 3];
+    fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3];
+    /// Spin of the second less that of the first, of `WIDTH` pairs from `place` of their block on.
+    fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
     /// Transposed store of six numbers: lane `k` of the values goes to `rows[k * stride..][..6]`.
@@ -177,12 +178,6 @@ pub fn is_far<T>(values: &[T]) -> bool {
     size_of_val(values) > 1 << 18
 }
 
-/// The record that begins at this number of the slice.
-#[inline(always)]
-fn record_at(records: &[Record], offset: u32) -> &Record {
-    &records[offset as usize / RECORD]
-}
-
 impl Lane for f64 {
     type Mask = bool;
     const WIDTH: usize = 1;
@@ -236,11 +231,11 @@ impl Lane for f64 {
     }
     #[inline(always)]
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
-        bytemuck::cast(*record_at(records, offsets[0]))
+        bytemuck::cast(records[offsets[0] as usize / RECORD])
     }
     #[inline(always)]
-    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let [a, b] = [first[0], second[0]].map(|offset| record_at(records, offset));
+    fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3] {
+        let [a, b] = pairs.records(place);
         let ([x, y, z], [vx, vy, vz]) = (sub(b.position, a.position), sub(b.velocity, a.velocity));
         let [wx, wy, wz] = add(b.spin, a.spin);
         [
@@ -250,8 +245,9 @@ impl Lane for f64 {
         ]
     }
     #[inline(always)]
-    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
-        sub(record_at(records, second[0]).spin, record_at(records, first[0]).spin)
+    fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3] {
+        let [a, b] = pairs.records(place);
+        sub(b.spin, a.spin)
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], _stride: usize, offset: usize) {

@@ -335,7 +335,7 @@ impl PairPass {
             self.laws.evaluate(&mut answered, self.rolling.as_deref(), Some(&mut output));
             for place in batch.start * BLOCK..(batch.end * BLOCK).min(section.count) {
                 observed.line = line + place - blocks.start * BLOCK;
-                let wall = walls.then(|| section.second[place]);
+                let wall = walls.then(|| section.wall_of(place));
                 let touches = &answered.touches[place / BLOCK - batch.start];
                 observed.take(touches, place % BLOCK, section.first_of(place), wall, (ellipsoids, lasts));
             }

@@ -5,6 +5,7 @@ use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, MAX_ITERATIONS};
 use super::touch::{self, Shapes};
 use super::*;
+use crate::contact::section::{Partners, Section};
 use crate::contact::shift::{ShiftTable, encode};
 use crate::force::geometry::{self, CellMotion, Relative};
 use crate::force::lane::portable::Portable;
@@ -311,10 +312,18 @@ fn still() -> CellMotion {
     }
 }
 
+/// A contact of the first and the second of two records.
+fn contact() -> Section {
+    let mut section = Section::new(0, Partners::Near, 0, 0);
+    section.resize(1);
+    section.set(0, 0, 1, encode([0; 3]));
+    section
+}
+
 #[test]
 fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
     let mut random = Random::new(6);
-    let motion = still();
+    let (motion, section) = (still(), contact());
     for _ in 0..2000 {
         let radii = [random.between(0.5e-6, 1e-6), random.between(0.5e-6, 1e-6)];
         let overlap = libm::pow(10.0, random.between(-4.0, -0.7)) * radii[0].min(radii[1]);
@@ -322,7 +331,7 @@ fn spheres_as_ellipsoids_give_what_the_sphere_code_gives() {
         let body =
             |position, radius| Record { position, radius, radius_again: radius, inverse_mass: 1.0, ..Record::zeroed() };
         let records = [body([0.0; 3], radii[0]), body(branch, radii[1])];
-        let sphere = geometry::spheres::<f64>(&records, [&[0], &[RECORD as u32]], &[encode([0; 3])], &motion);
+        let sphere = geometry::spheres::<f64>(&section.pairs(&records).block(0), 0, &motion);
         let pair = Ellipsoids { tensors: radii.map(sphere_tensor), branch };
         let found = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found;
         let ellipse = Ellipse::new(&found.radii);
@@ -390,7 +399,7 @@ impl Moving {
 #[test]
 fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodies() {
     let mut random = Random::new(8);
-    let motion = still();
+    let (motion, section) = (still(), contact());
     for _ in 0..500 {
         let (pair, slow) = random_pair(&mut random);
         let mut body = |position, semi_axes, orientation| Moving {
@@ -403,11 +412,8 @@ fn the_overlap_rate_is_the_derivative_of_the_overlap_of_moving_and_turning_bodie
         let bodies = [body([0.0; 3], slow.axes[0], slow.turns[0]), body(pair.branch, slow.axes[1], slow.turns[1])];
         let at = |time: f64| {
             let [(a, s), (b, t)] = [bodies[0].at(time), bodies[1].at(time)];
-            let (records, places): (_, [&[u32]; 2]) = ([a, b], [&[0], &[RECORD as u32]]);
-            let bodies = Relative {
-                relative_spin: f64::relative_spin(&records, places),
-                ..geometry::relative(&records, places, &[encode([0; 3])], &motion)
-            };
+            let records = [a, b];
+            let bodies = geometry::relative(&section.pairs(&records).block(0), 0, &motion);
             let normal = pair.common_normal([0.0; 3], [0.0; 3], 0.0).found.normal;
             touch::ellipsoids(&bodies, &[s, t], [normal, [0.0; 3]], 0.0)
         };

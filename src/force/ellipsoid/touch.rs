@@ -4,7 +4,7 @@
 use super::curvature::Ellipse;
 use super::normal::{Ellipsoids, Found};
 use super::{radii_tensor, shape_tensor, support, tangents};
-use crate::contact::section::{BLOCK, CacheLine, Section};
+use crate::contact::section::{BLOCK, CacheLine, Pairs, Section};
 use crate::force::geometry::{self, CellMotion, PairTouch, Relative, TOUCH_TOLERANCE};
 use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
@@ -42,9 +42,9 @@ const NUMBERS: usize = 33;
 pub struct BlockSource<'a> {
     /// What is the same for all.
     pub surroundings: &'a Surroundings<'a>,
-    /// Records from the section's origin on.
-    pub records: &'a [Record],
-    /// Shapes likewise.
+    /// The section's pairs.
+    pub pairs: &'a Pairs<'a>,
+    /// Shapes from the section's origin on.
     pub shapes: &'a [Shape],
     /// The section.
     pub section: &'a Section,
@@ -91,14 +91,10 @@ impl BlockSource<'_> {
 
     #[inline(always)]
     fn touch<L: Lane>(&self, lane: usize) -> EllipsoidTouch<L> {
-        let place = self.block * BLOCK + lane;
-        let lanes = place..place + L::WIDTH;
-        let (first, second) = (&self.section.first[lanes.clone()], &self.section.second[lanes.clone()]);
-        let shapes = [Shapes::<L>::gather(self.shapes, first), Shapes::gather(self.shapes, second)];
-        let bodies = Relative {
-            relative_spin: L::relative_spin(self.records, [first, second]),
-            ..geometry::relative(self.records, [first, second], &self.section.shift[lanes], self.surroundings.motion)
-        };
+        let pairs = self.pairs.block(self.block);
+        let [first, second] = pairs.offsets();
+        let shapes = [Shapes::<L>::gather(self.shapes, &first[lane..]), Shapes::gather(self.shapes, &second[lane..])];
+        let bodies = geometry::relative(&pairs, lane, self.surroundings.motion);
         let round = shapes[0].is_sphere() & shapes[1].is_sphere();
         if !L::any(!round) {
             return EllipsoidTouch::of_spheres(geometry::touch(&bodies, true));

@@ -2,6 +2,7 @@
 //! processor has been asked.
 
 use super::{BIAS, Lane, ONE, SHAPE, SIGNIFICAND, SIGNIFICAND_BITS, WHOLE};
+use crate::contact::section::BlockPairs;
 use crate::state::particles::{RECORD, Record};
 use crate::state::shape::Shape;
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
@@ -93,25 +94,23 @@ pub(super) unsafe fn relative_rows<const EQUAL: bool>(a: *const f64, b: *const f
 #[repr(C, packed)]
 struct Unaligned(__m128i);
 
-/// Where the records of the first four offsets of some lists begin.
+/// Where the records of four offsets begin.
 #[inline(always)]
-fn rows_of<const N: usize>(records: &[Record], lists: [&[u32]; N]) -> [[*const f64; 4]; N] {
-    let lists = lists.map(|offsets| <&[u32; 4]>::try_from(&offsets[..4]).expect("four offsets"));
+fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 4] {
+    let offsets: &[u32; 4] = offsets[..4].try_into().expect("four offsets");
     let count = u32::try_from(records.len() * RECORD).unwrap_or(u32::MAX);
     // SAFETY: the processor has AVX2 (head of this file). Volatile, so that the scalar loads of the same offsets below
     // stay loads: taking them out of the vector costs more.
     let inside = unsafe {
         let last = _mm_set1_epi32(count.saturating_sub(RECORD as u32).cast_signed());
-        let mut beyond = last;
-        for offsets in lists {
-            beyond = _mm_max_epu32(beyond, offsets.as_ptr().cast::<Unaligned>().read_volatile().0);
-        }
+        let beyond = _mm_max_epu32(offsets.as_ptr().cast::<Unaligned>().read_volatile().0, last);
         _mm_movemask_epi8(_mm_cmpeq_epi32(beyond, last))
     };
-    assert!(inside == 0xffff && count > 0, "the contact list names particles that are not there");
+    assert!(inside == 0xffff && count > 0, "no record begins at some offset");
     let start: *const f64 = records.as_ptr().cast();
-    // SAFETY: a whole record follows each offset.
-    lists.map(|offsets| offsets.map(|offset| unsafe { start.add(offset as usize) }))
+    // SAFETY: a whole record follows each of the four.
+    let row = |k: usize| unsafe { start.add(offsets[k] as usize) };
+    [row(0), row(1), row(2), row(3)]
 }
 
 /// Ask for the cache line at an address.
@@ -199,7 +198,7 @@ impl Lane for F64x4 {
     }
     #[inline(always)]
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD] {
-        let [row] = rows_of(records, [offsets]);
+        let row = rows_of(records, offsets);
         let mut columns = [Self::splat(0.0); RECORD];
         for group in 0..RECORD / 4 {
             // SAFETY: the processor has AVX2 (head of this file); each row points at the twelve numbers of a
@@ -220,11 +219,11 @@ impl Lane for F64x4 {
         columns
     }
     #[inline(always)]
-    fn relative<const EQUAL: bool>(records: &[Record], pairs: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let [first, second] = rows_of(records, pairs);
+    fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3] {
+        let [first, second] = pairs.starts::<4>(place);
         let mut rows = [[Self::splat(0.0).0; 4]; 3];
         for k in 0..4 {
-            // SAFETY: the processor has AVX2 (head of this file); the rows point at records.
+            // SAFETY: the processor has AVX2 (head of this file); `BlockPairs` points at records.
             [rows[0][k], rows[1][k], rows[2][k]] = unsafe { relative_rows::<EQUAL>(first[k], second[k]) };
         }
         let mut columns = [[Self::splat(0.0); 4]; 3];
@@ -235,9 +234,15 @@ impl Lane for F64x4 {
         columns
     }
     #[inline(always)]
-    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
-        let (a, b) = (Self::gather(records, first), Self::gather(records, second));
-        [b[8] - a[8], b[9] - a[9], b[10] - a[10]]
+    fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3] {
+        let [first, second] = pairs.starts::<4>(place);
+        // SAFETY: the processor has AVX2 (head of this file); `BlockPairs` points at records, whose spins are the numbers
+        // from 8 on.
+        let [x, y, z, _] = unsafe {
+            let row = |k: usize| _mm256_sub_pd(_mm256_loadu_pd(second[k].add(8)), _mm256_loadu_pd(first[k].add(8)));
+            transpose([row(0), row(1), row(2), row(3)])
+        };
+        [Self(x), Self(y), Self(z)]
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {

@@ -5,6 +5,7 @@
 
 use super::avx2::relative_rows;
 use super::{BIAS, Lane, ONE, SHAPE, SIGNIFICAND, SIGNIFICAND_BITS, WHOLE};
+use crate::contact::section::BlockPairs;
 use crate::state::particles::{RECORD, Record};
 use crate::state::shape::Shape;
 #[allow(clippy::wildcard_imports, reason = "the intrinsics")]
@@ -140,7 +141,7 @@ fn rows_of(records: &[Record], offsets: &[u32]) -> [*const f64; 8] {
         let last = _mm256_set1_epi32(count.saturating_sub(RECORD as u32).cast_signed());
         _mm256_cmple_epu32_mask(offsets.as_ptr().cast::<Unaligned>().read_volatile().0, last)
     };
-    assert!(inside == u8::MAX && count > 0, "the contact list names particles that are not there");
+    assert!(inside == u8::MAX && count > 0, "no record begins at some offset");
     let start: *const f64 = records.as_ptr().cast();
     // SAFETY: a whole record follows each of the eight.
     let row = |k: usize| unsafe { start.add(offsets[k] as usize) };
@@ -239,10 +240,10 @@ impl Lane for F64x8 {
         columns
     }
     #[inline(always)]
-    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let (first, second) = (rows_of(records, first), rows_of(records, second));
+    fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3] {
+        let [first, second] = pairs.starts::<8>(place);
         let mut result = [[Self::splat(0.0); 4]; 3];
-        // SAFETY: the processor has AVX-512 (head of this file); the rows point at records.
+        // SAFETY: the processor has AVX-512 (head of this file); `BlockPairs` points at records.
         unsafe {
             let mut rows = [[_mm512_setzero_pd(); 4]; 3];
             for (k, (low, high)) in [(0, 2), (1, 3), (4, 6), (5, 7)].into_iter().enumerate() {
@@ -260,9 +261,17 @@ impl Lane for F64x8 {
         result
     }
     #[inline(always)]
-    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
-        let (a, b) = (Self::gather(records, first), Self::gather(records, second));
-        [b[8] - a[8], b[9] - a[9], b[10] - a[10]]
+    fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3] {
+        let [first, second] = pairs.starts::<8>(place);
+        // SAFETY: the processor has AVX-512 (head of this file); `BlockPairs` points at records, whose spins are the numbers
+        // from 8 on.
+        let [x, y, z, _] = unsafe {
+            let rows = |low: usize, high: usize| {
+                _mm512_sub_pd(two_rows(second[low], second[high], 8), two_rows(first[low], first[high], 8))
+            };
+            columns([rows(0, 2), rows(1, 3), rows(4, 6), rows(5, 7)])
+        };
+        [Self(x), Self(y), Self(z)]
     }
     #[inline(always)]
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize) {

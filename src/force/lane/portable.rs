@@ -1,6 +1,7 @@
 //! Lanes in plain loops: what a processor without vector instructions runs, and the reference in tests.
 
 use super::{Lane, SHAPE};
+use crate::contact::section::BlockPairs;
 use crate::state::particles::{RECORD, Record};
 use crate::state::shape::Shape;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -146,13 +147,13 @@ impl<const N: usize> Lane for Portable<N> {
         std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
     }
     #[inline(always)]
-    fn relative<const EQUAL: bool>(records: &[Record], [first, second]: [&[u32]; 2]) -> [[Self; 4]; 3] {
-        let rows: [_; N] = std::array::from_fn(|k| f64::relative::<EQUAL>(records, [&first[k..], &second[k..]]));
+    fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::relative::<EQUAL>(pairs, place + k));
         std::array::from_fn(|group| std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][group][c]))))
     }
     #[inline(always)]
-    fn relative_spin(records: &[Record], [first, second]: [&[u32]; 2]) -> [Self; 3] {
-        let rows: [_; N] = std::array::from_fn(|k| f64::relative_spin(records, [&first[k..], &second[k..]]));
+    fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3] {
+        let rows: [_; N] = std::array::from_fn(|k| f64::relative_spin(pairs, place + k));
         std::array::from_fn(|c| Self(std::array::from_fn(|k| rows[k][c])))
     }
     #[inline(always)]

@@ -17,18 +17,17 @@ pub fn normal_columns() -> impl Iterator<Item = Column> {
 pub(super) fn geometry(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
     let Source { input, bodies: BodyData { records, shapes }, section, ref blocks, content, normals } = *source;
     let surroundings = Surroundings { motion: input.motion, range: content.range, simd: input.simd };
-    let far = is_far(records);
+    let (pairs, far) = (section.pairs(records), is_far(records));
     let mut excess = None;
     for (block, touches) in blocks.clone().zip(touches) {
-        let ahead = (block + RECORDS_AHEAD) * BLOCK..(block + RECORDS_AHEAD + 1) * BLOCK;
-        if far && let (Some(first), Some(second)) = (section.first.get(ahead.clone()), section.second.get(ahead)) {
-            for (first, second) in first.iter().zip(second) {
-                let body = (*first).max(*second) as usize / RECORD;
+        if far && let Some(offsets) = pairs.farther(block + RECORDS_AHEAD) {
+            for offset in offsets {
+                let body = offset as usize / RECORD;
                 prefetch(records, body, 1);
                 prefetch(shapes, body, 1);
             }
         }
-        BlockSource { surroundings: &surroundings, records, shapes, section, block, normals }.fill(touches);
+        BlockSource { surroundings: &surroundings, pairs: &pairs, shapes, section, block, normals }.fill(touches);
         let found = || touches.excess(input.max_overlap_fraction);
         excess = excess.or_else(|| found().map(|(lane, ratio)| (block * BLOCK + lane, ratio)));
     }

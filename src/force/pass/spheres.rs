@@ -1,7 +1,7 @@
 //! The geometric stages of the contact pass between spheres: the bodies relative to each other, then the touch.
 
-use super::{BodyData, Excess, LIST_AHEAD, PassInput, RECORDS_AHEAD, Source};
-use crate::contact::section::BLOCK;
+use super::{BodyData, Excess, LIST_AHEAD, RECORDS_AHEAD, Source};
+use crate::contact::section::{BLOCK, Pairs};
 use crate::contact::shift;
 use crate::force::geometry::{self, Relative};
 use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
@@ -51,20 +51,21 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     touches: &mut [BlockTouches; BATCH],
     each: Each,
 ) -> Excess {
-    let Source { input, bodies: BodyData { records, .. }, section, content, .. } = *source;
-    let far = is_far(records);
+    let Source { input, bodies: BodyData { records, .. }, section, content, ref blocks, .. } = *source;
+    let (pairs, far) = (section.pairs(records), is_far(records));
     let mut excess = None;
-    let mut start = source.blocks.start;
-    while start < source.blocks.end {
-        let blocks = start..(start + BATCH).min(source.blocks.end);
+    let mut start = blocks.start;
+    while start < blocks.end {
+        let blocks = start..(start + BATCH).min(blocks.end);
         if far {
             let ahead = (start + LIST_AHEAD) * BLOCK;
-            prefetch(&section.first, ahead, BATCH * BLOCK);
-            prefetch(&section.second, ahead, BATCH * BLOCK);
+            for offsets in section.offsets() {
+                prefetch(offsets, ahead, BATCH * BLOCK);
+            }
             prefetch(&section.shift, ahead, BATCH * BLOCK);
         }
         let touches = &mut touches[..blocks.len()];
-        let unequal = bodies_of::<L, EQUAL>(source, blocks.clone(), far, touches);
+        let unequal = bodies_of::<L, EQUAL>(source, &pairs, blocks.clone(), touches);
         // Most runs have no walls that move, no memory that lasts and no ledger; without the questions the loop is shorter.
         let faulty = if content.detailed || content.range != 0.0 || input.motion.faces_move {
             touches_of::<L, EQUAL, false>(source, touches, unequal)
@@ -80,49 +81,46 @@ fn geometry_of<L: Lane, const EQUAL: bool>(
     excess
 }
 
-/// The bodies of a batch relative to each other; gives whether some are of unequal radii.
+/// The bodies of a batch relative to each other, `all` being the section's pairs; gives whether some are of unequal radii.
 #[inline(always)]
 fn bodies_of<L: Lane, const EQUAL: bool>(
     source: &Source,
+    all: &Pairs,
     blocks: Range<usize>,
-    far: bool,
     touches: &mut [BlockTouches],
 ) -> bool {
-    let Source { input: PassInput { motion, .. }, bodies: BodyData { records, .. }, section, content, .. } = *source;
-    let (first, second) = (section.first.as_chunks::<BLOCK>().0, section.second.as_chunks::<BLOCK>().0);
-    let pairs = first[blocks.clone()].iter().zip(&second[blocks.clone()]);
-    let codes = &section.shift.as_chunks::<BLOCK>().0[blocks.clone()];
-    let numbers: &[f64] = bytemuck::cast_slice(records);
+    let far = is_far(source.bodies.records);
+    let batch = all.part(blocks.clone());
+    let motion = source.input.motion;
     let mut unequal = L::splat(0.0).greater(L::splat(0.0));
-    for (((block, pair), codes), touches) in blocks.zip(pairs.clone()).zip(codes).zip(touches.iter_mut()) {
-        let ahead = block + RECORDS_AHEAD;
-        if far && let (Some(first), Some(second)) = (first.get(ahead), second.get(ahead)) {
-            let later: [u32; BLOCK] = std::array::from_fn(|place| first[place].max(second[place]));
-            for offset in later {
-                prefetch(numbers, offset as usize, RECORD);
+    for ((block, pairs), touches) in blocks.zip(batch.blocks()).zip(touches.iter_mut()) {
+        // With each block a few: many requests at once would wait for each other.
+        if far && let Some(offsets) = all.farther(block + RECORDS_AHEAD) {
+            for offset in offsets {
+                prefetch(all.numbers(), offset as usize, RECORD);
             }
         }
         for_each_group!(L, lane, {
-            let pair = Relative::<L>::of::<EQUAL>(records, [&pair.0[lane..], &pair.1[lane..]]);
+            let pair = Relative::<L>::of::<EQUAL>(&pairs, lane);
             touches.put_relative::<L, EQUAL>(lane, &pair);
             if !EQUAL {
                 unequal = unequal | pair.unequal();
             }
         });
         // Away from periodic faces there is nothing to look up.
-        if motion.faces_move || !shift::all_here(codes) {
+        if motion.faces_move || !shift::all_here(pairs.codes()) {
             for_each_group!(L, lane, {
                 let mut pair = touches.relative::<L>(lane);
-                pair.enter_images(&codes[lane..], motion);
+                pair.enter_images(&pairs.codes()[lane..], motion);
                 touches.put_images(lane, &pair);
             });
         }
     }
     let unequal = L::any(unequal);
-    if content.rolling || unequal {
-        for (pair, touches) in pairs.zip(touches.iter_mut()) {
+    if source.content.rolling || unequal {
+        for (pairs, touches) in batch.blocks().zip(touches.iter_mut()) {
             for_each_group!(L, lane, {
-                let spin = L::relative_spin(records, [&pair.0[lane..], &pair.1[lane..]]);
+                let spin = L::relative_spin(&pairs, lane);
                 touches.put_relative_spin(lane, &spin);
             });
         }
@@ -134,9 +132,11 @@ fn bodies_of<L: Lane, const EQUAL: bool>(
 #[cold]
 fn excess_of(source: &Source, blocks: Range<usize>) -> Excess {
     let Source { input, bodies: BodyData { records, .. }, section, .. } = *source;
-    (blocks.start * BLOCK..blocks.end * BLOCK).find_map(|place| {
-        let pair = [&section.first[place..=place], &section.second[place..=place]];
-        let pair = geometry::spheres::<f64>(records, pair, &section.shift[place..=place], input.motion);
+    let places = blocks.start * BLOCK..blocks.end * BLOCK;
+    let pairs = section.pairs(records).part(blocks);
+    let lanes = pairs.blocks().flat_map(|pairs| (0..BLOCK).map(move |lane| (pairs, lane)));
+    places.zip(lanes).find_map(|(place, (pairs, lane))| {
+        let pair = geometry::spheres::<f64>(&pairs, lane, input.motion);
         let (overlap, radius) = (pair.touch.overlap, pair.min_radius);
         // Written so that NaN counts as a fault.
         let within = overlap <= input.max_overlap_fraction * radius;

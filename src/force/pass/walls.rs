@@ -5,7 +5,6 @@ use crate::contact::section::BLOCK;
 use crate::force::ellipsoid::touch;
 use crate::force::geometry;
 use crate::force::touches::{BATCH, BlockTouches};
-use crate::state::particles::RECORD;
 
 /// Touches of some blocks of contacts with walls, and the first that overlaps too much or is not a number.
 pub(super) fn geometry(source: &Source, touches: &mut [BlockTouches; BATCH]) -> Excess {
@@ -14,7 +13,7 @@ pub(super) fn geometry(source: &Source, touches: &mut [BlockTouches; BATCH]) -> 
     for (block, touches) in blocks.clone().zip(touches) {
         touches.put_none();
         for place in block * BLOCK..((block + 1) * BLOCK).min(section.count) {
-            let (first, wall, lane) = (section.first[place] as usize / RECORD, section.second[place], place % BLOCK);
+            let (first, wall, lane) = (section.first_of(place) - section.origin, section.wall_of(place), place % BLOCK);
             let record = &bodies.records[first];
             if bodies.shapes.is_empty() {
                 touches.put_any(lane, &geometry::wall(record, wall, input.motion), content.range);
