@@ -73,7 +73,8 @@ impl Scene {
         let mut touches = BlockTouches::zeroed();
         let Self { records, shapes, section, .. } = self;
         let pairs = section.pairs(records);
-        BlockSource { surroundings: &surroundings, pairs: &pairs, shapes, section, block, normals: 0 }.fill(&mut touches);
+        BlockSource { surroundings: &surroundings, pairs: &pairs, shapes, section, block, normals: 0 }
+            .fill(&mut touches);
         touches
     }
 

@@ -174,3 +174,36 @@ impl<'a> Reading<'a> {
         (self.offsets, self.ends)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn visits_go_through_all_places_by_the_number_of_ends() {
+        let counts: Vec<usize> = (0..100).map(|place| place * 7 % 12).collect();
+        let visits = Visits::new(&counts);
+        let mut seen = Vec::new();
+        for (number, group) in visits.groups().enumerate() {
+            for place in group {
+                let count = counts[usize::from(*place)];
+                assert!(count == number || number > MOST_WRITTEN_OUT && count > MOST_WRITTEN_OUT, "{number}: {count}");
+                seen.push(*place);
+            }
+        }
+        seen.sort_unstable();
+        assert_eq!(seen, (0..100).collect::<Vec<u8>>());
+        assert_eq!(Visits::new(&[]).groups().map(<[u8]>::len).sum::<usize>(), 0);
+        assert_eq!(Visits::new(&[9; CHUNK]).groups().last().map(<[u8]>::len), Some(CHUNK));
+    }
+
+    #[test]
+    fn an_end_gives_its_number_place_and_side() {
+        for number in [0, 3, End::MAX] {
+            let [first, second] = [End::new(number, false), End::new(number, true)];
+            assert_eq!((first.number(), second.number()), (number, number));
+            assert_eq!((first.place::<false>(), second.place::<true>()), (2 * number, 2 * number));
+            assert!(second.is_second() && !first.is_second());
+        }
+    }
+}

@@ -68,11 +68,7 @@ impl Dashpot {
     #[inline(always)]
     #[must_use]
     pub fn coefficient<L: Lane>(&self, contact_radius: L, effective_mass: L) -> L {
-        if self.damps {
-            L::splat(self.factor) * (contact_radius * effective_mass).sqrt()
-        } else {
-            L::splat(0.0)
-        }
+        if self.damps { L::splat(self.factor) * (contact_radius * effective_mass).sqrt() } else { L::splat(0.0) }
     }
 }
 

@@ -123,6 +123,14 @@ impl<L: Lane> Relative<L> {
         }
     }
 
+    /// Distance of the centres \[m\] and its reciprocal.
+    #[inline(always)]
+    #[must_use]
+    pub fn distance(&self) -> [L; 2] {
+        let distance = dot(self.branch, self.branch).sqrt();
+        [distance, L::splat(1.0) / distance]
+    }
+
     /// Both of this radius.
     #[inline(always)]
     pub fn equal(&mut self, radius: f64) {
@@ -155,14 +163,13 @@ impl<L: Lane> Relative<L> {
 ///
 /// The surfaces turn past each other with `(a_i ω_i + a_j ω_j) × n = ½ (ω_i + ω_j) × d n + ½ (R_j − R_i)(ω_j − ω_i) × n`.
 ///
-/// `mixed`: some pairs may have unequal radii.
+/// Gets the pair's [`Relative::distance`]; `mixed`: some pairs may have unequal radii.
 #[inline(always)]
 #[must_use]
-pub fn touch<L: Lane>(pair: &Relative<L>, mixed: bool) -> PairTouch<L> {
+pub fn touch<L: Lane>(pair: &Relative<L>, [distance, reciprocal]: [L; 2], mixed: bool) -> PairTouch<L> {
     let (branch, sum, difference, half) = (pair.branch, pair.radius_sum, pair.radius_difference, L::splat(0.5));
-    let distance = dot(branch, branch).sqrt();
     let overlap = sum - distance;
-    let normal = scale(branch, L::splat(1.0) / distance);
+    let normal = scale(branch, reciprocal);
     let approach = dot(pair.velocity, normal);
     let mean_spin = scale(pair.spin_sum, half);
     let mut turning = cross(mean_spin, branch);
@@ -223,7 +230,8 @@ pub fn relative<L: Lane>(pairs: &BlockPairs, lane: usize, motion: &CellMotion) -
 #[inline(always)]
 #[must_use]
 pub fn spheres<L: Lane>(pairs: &BlockPairs, lane: usize, motion: &CellMotion) -> PairTouch<L> {
-    touch(&relative(pairs, lane, motion), true)
+    let pair = relative(pairs, lane, motion);
+    touch(&pair, pair.distance(), true)
 }
 
 /// Touch of a sphere and a plane wall (2·axis + side). The wall has infinite mass and no curvature; it moves

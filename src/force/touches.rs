@@ -74,6 +74,8 @@ impl Numbers<6> {
 pub struct BlockTouches {
     /// The bodies; then, in their place, the touch.
     numbers: Numbers<12>,
+    /// The distance and its reciprocal.
+    distance: Numbers<2>,
     arms: Numbers<2>,
     normal: Numbers<3>,
     /// What the tangential law hands on.
@@ -96,7 +98,7 @@ pub struct BlockTouches {
     energies: Numbers<6>,
     rolling_energies: Numbers<6>,
     /// Keeps the same numbers of neighbouring blocks apart in the nearest cache, see [`APART`].
-    _apart: Numbers<12>,
+    _apart: Numbers<10>,
 }
 
 /// Lines by which the same number of two neighbouring blocks lies apart, modulo the 64 places of the nearest cache: more
@@ -128,6 +130,19 @@ impl BlockTouches {
     pub fn put_images<L: Lane>(&mut self, lane: usize, pair: &Relative<L>) {
         self.numbers.put(0, lane, &pair.branch);
         self.imposed_velocity.put(0, lane, &pair.imposed_velocity);
+    }
+
+    /// Take in distances and reciprocals of the lanes from `lane` on.
+    #[inline(always)]
+    pub fn put_distance<L: Lane>(&mut self, lane: usize, distance: &[L; 2]) {
+        self.distance.put(0, lane, distance);
+    }
+
+    /// Distances \[m\] and reciprocals of the lanes from `lane` on.
+    #[inline(always)]
+    #[must_use]
+    pub fn distance<L: Lane>(&self, lane: usize) -> [L; 2] {
+        [self.distance.one(0, lane), self.distance.one(1, lane)]
     }
 
     /// Take in ω_j − ω_i \[rad/s\] of the lanes from `lane` on.

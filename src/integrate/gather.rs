@@ -142,11 +142,8 @@ unsafe fn sum<L: Lane, const WIDTH: usize, const SECOND: bool>(ends: &[End], num
         (12, true) => 8,
         _ => 4,
     };
-    let (mut force, mut torque) = if SECOND {
-        (L::splat(0.0), L::splat(0.0))
-    } else {
-        (L::load(&load[..4]), L::load(&load[first_torque..]))
-    };
+    let (mut force, mut torque) =
+        if SECOND { (L::splat(0.0), L::splat(0.0)) } else { (L::load(&load[..4]), L::load(&load[first_torque..])) };
     for end in ends {
         let line = end.place::<SECOND>();
         // SAFETY: as the function's; all that is read lies within the line's `WIDTH` numbers.
@@ -158,4 +155,95 @@ unsafe fn sum<L: Lane, const WIDTH: usize, const SECOND: bool>(ends: &[End], num
     }
     force.store(&mut load[..4]);
     torque.store(&mut load[first_torque..]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::list::ContactList;
+    use crate::contact::section::{PARTNERS, Partners};
+    use crate::contact::shift;
+    use crate::force::lane::portable::Portable;
+    use crate::state::particles::Particles;
+
+    /// Particles in one strip with none to 43 contacts on either side, near ones and across a face.
+    fn list(particles: &Particles) -> ContactList {
+        let mut list = ContactList::default();
+        list.cut(std::iter::once(0..particles.owned).collect(), 1, &[1]);
+        for (partners, step) in [(Partners::Near, 3), (Partners::Apart, 7)] {
+            let kind = PARTNERS.iter().position(|kind| *kind == partners).expect("a kind of partners");
+            let stars = [(40, 3), (41, 40), (150, 12), (199, 1)].into_iter();
+            let mut pairs: Vec<(u32, u32)> = stars
+                .flat_map(|(centre, count)| (0..count).map(move |k| (centre, (centre + step * (k + 1)) % 200)))
+                .chain((0..200).step_by(5).flat_map(|p| (1..p / 20).map(move |k| (p, (p + step + k) % 200))))
+                .map(
+                    |(a, b)| {
+                        if particles.id[a] < particles.id[b] { (a as u32, b as u32) } else { (b as u32, a as u32) }
+                    },
+                )
+                .collect();
+            pairs.sort_by_key(|(a, b)| *a.min(b));
+            let section = &mut list.sections[kind];
+            section.resize(pairs.len());
+            for (place, (a, b)) in pairs.into_iter().enumerate() {
+                section.set(place, a, b, shift::encode([0; 3]));
+            }
+        }
+        list
+    }
+
+    fn compare<const WIDTH: usize, const STRIDE: usize>() {
+        let mut particles = Particles { owned: 200, ..Particles::default() };
+        particles.id.extend((0..200).map(|p| p * 101 % 211));
+        particles.record.resize(200, bytemuck::Zeroable::zeroed());
+        let mut list = list(&particles);
+        list.index(&particles, 211, STRIDE);
+        let value = |line: usize, number: usize| ((line * 37 + number * 101) % 1009) as f64 / 7.0 - 71.0;
+        let mut most = 0;
+        for (chunk, start) in (0..particles.owned).step_by(CHUNK).enumerate() {
+            // A ring with room for all lines, so that none has been overwritten.
+            let strip = &list.strips[0];
+            let mut buffer = vec![0.0; strip.room()];
+            let reached = list.runs.get(strip.near.start + chunk + 1).map_or(list.lines, |run| run.line as usize);
+            for line in reached.saturating_sub(strip.ring).max(list.kept)..reached {
+                for number in 0..STRIDE {
+                    buffer[(line & (strip.ring - 1)) * STRIDE + number] = value(line, number);
+                }
+            }
+            let kept: Vec<f64> = (0..list.kept * STRIDE).map(|k| value(k / STRIDE, k % STRIDE)).collect();
+            let (ring, reads) = (strip.ring, strip.kept_reads_of(chunk).to_vec());
+            let (buffer, kept, reads) = (&mut buffer[..], &kept[..], &reads[..]);
+            let mut lines = Lines { width: WIDTH, stride: STRIDE, buffer, ring, kept, reads };
+            let mut loads = [[0.0; 8]; CHUNK];
+            lines.sum_all::<Portable<4>>(&list.parts().0.ends_of(0, chunk), &mut loads);
+            for (particle, load) in (start..particles.owned).zip(&loads) {
+                let mut expected = [0.0; 6];
+                for (line, second) in list.lines_of(particle) {
+                    for axis in 0..3 {
+                        let force = value(line, axis);
+                        expected[axis] += if second { -force } else { force };
+                        expected[3 + axis] += match WIDTH {
+                            4 => 0.0,
+                            6 => value(line, 3 + axis),
+                            _ => value(line, if second { 8 } else { 4 } + axis),
+                        };
+                    }
+                }
+                most = most.max(list.lines_of(particle).count());
+                let got = [load[0], load[1], load[2], load[4], load[5], load[6]];
+                assert_eq!(got, expected, "width {WIDTH}, stride {STRIDE}, particle {particle}");
+            }
+        }
+        assert!(most > 40, "{most}");
+    }
+
+    #[test]
+    fn sums_are_those_over_the_lines_in_order() {
+        compare::<4, 4>();
+        compare::<6, 6>();
+        compare::<12, 12>();
+        compare::<4, 12>();
+        compare::<6, 14>();
+        compare::<12, 20>();
+    }
 }

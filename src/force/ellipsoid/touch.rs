@@ -97,7 +97,7 @@ impl BlockSource<'_> {
         let bodies = geometry::relative(&pairs, lane, self.surroundings.motion);
         let round = shapes[0].is_sphere() & shapes[1].is_sphere();
         if !L::any(!round) {
-            return EllipsoidTouch::of_spheres(geometry::touch(&bodies, true));
+            return EllipsoidTouch::of_spheres(geometry::touch(&bodies, bodies.distance(), true));
         }
         let memory = self.block * self.section.columns + self.normals;
         let stored = vector_at(&self.section.memory[memory..memory + 3], lane);
@@ -106,7 +106,7 @@ impl BlockSource<'_> {
         if !L::any(round) {
             return touch;
         }
-        let of_spheres = EllipsoidTouch::of_spheres(geometry::touch(&bodies, true));
+        let of_spheres = EllipsoidTouch::of_spheres(geometry::touch(&bodies, bodies.distance(), true));
         // By lane and not by block: a pair's bits must not hang on the pairs beside it.
         let mut numbers = touch.numbers();
         for (number, of_spheres) in numbers.iter_mut().zip(of_spheres.numbers()) {

@@ -17,11 +17,7 @@ type Each<'a> = &'a mut dyn FnMut(Range<usize>, &mut [BlockTouches]);
 
 /// Geometry of the blocks of sphere pairs, batch by batch, and the first contact that overlaps too much or is not a number.
 /// `EQUAL`: all spheres have the same radius, which the touches know ([`BlockTouches::put_radius`]).
-pub(super) fn geometry<const EQUAL: bool>(
-    source: &Source,
-    touches: &mut [BlockTouches; BATCH],
-    each: Each,
-) -> Excess {
+pub(super) fn geometry<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH], each: Each) -> Excess {
     match source.input.simd {
         // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
         #[cfg(target_arch = "x86_64")]
@@ -46,11 +42,7 @@ fn geometry_avx512<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouch
 }
 
 #[inline(always)]
-fn geometry_of<L: Lane, const EQUAL: bool>(
-    source: &Source,
-    touches: &mut [BlockTouches; BATCH],
-    each: Each,
-) -> Excess {
+fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH], each: Each) -> Excess {
     let Source { input, bodies: BodyData { records, .. }, section, content, ref blocks, .. } = *source;
     let (pairs, far) = (section.pairs(records), is_far(records));
     let mut excess = None;
@@ -103,6 +95,8 @@ fn bodies_of<L: Lane, const EQUAL: bool>(
         for_each_group!(L, lane, {
             let pair = Relative::<L>::of::<EQUAL>(&pairs, lane);
             touches.put_relative::<L, EQUAL>(lane, &pair);
+            // Here and not with the touch, as there is enough to do meanwhile.
+            touches.put_distance(lane, &pair.distance());
             if !EQUAL {
                 unequal = unequal | pair.unequal();
             }
@@ -113,6 +107,7 @@ fn bodies_of<L: Lane, const EQUAL: bool>(
                 let mut pair = touches.relative::<L>(lane);
                 pair.enter_images(&pairs.codes()[lane..], motion);
                 touches.put_images(lane, &pair);
+                touches.put_distance(lane, &pair.distance());
             });
         }
     }
@@ -169,7 +164,7 @@ fn touches_of<L: Lane, const EQUAL: bool, const PLAIN: bool>(
                 // Here already, so that no register has to hold them until the touch is known.
                 touches.put_details(lane, &pair.branch, &pair.imposed_velocity);
             }
-            let pair = geometry::touch(&pair, !EQUAL && unequal);
+            let pair = geometry::touch(&pair, touches.distance(lane), !EQUAL && unequal);
             touches.put_touch::<L, EQUAL>(lane, &pair, content);
             // Written so that NaN counts as a fault.
             let beyond = (L::splat(limit) * pair.min_radius).not_at_least(pair.touch.overlap);
