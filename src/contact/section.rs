@@ -146,7 +146,10 @@ impl Section {
         let wall = self.partners == Partners::Wall;
         self.first[place] = first * unit;
         self.second[place] = if wall { second } else { second * unit };
-        self.highest = self.highest.max(if wall { first } else { first.max(second) } * unit);
+        self.highest = self.highest.max(self.first[place]);
+        if !wall {
+            self.highest = self.highest.max(self.second[place]);
+        }
         self.shift[place] = code;
         let start = place / BLOCK * self.columns;
         for line in &mut self.memory[start..start + self.columns] {
@@ -279,6 +282,17 @@ impl<'a> BlockPairs<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[should_panic(expected = "names particles that are not there")]
+    fn pairs_without_all_their_records_are_refused() {
+        let mut section = Section::new(0, Partners::Near, 0, 0);
+        section.resize(10);
+        section.set(9, 3, 20, 0);
+        let records = vec![Record::zeroed(); 21];
+        assert_eq!(section.pairs(&records).block(1).records(1).len(), 2);
+        let _ = section.pairs(&records[..20]);
+    }
 
     #[test]
     fn memory_stays_with_its_contact() {
