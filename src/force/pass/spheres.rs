@@ -92,17 +92,20 @@ fn bodies_of<L: Lane, const EQUAL: bool>(
                 prefetch(all.numbers(), offset as usize, RECORD);
             }
         }
+        // Away from periodic faces there is nothing to look up.
+        let images = motion.faces_move || !shift::all_here(pairs.codes());
         for_each_group!(L, lane, {
             let pair = Relative::<L>::of::<EQUAL>(&pairs, lane);
             touches.put_relative::<L, EQUAL>(lane, &pair);
             // Here and not with the touch, as there is enough to do meanwhile.
-            touches.put_distance(lane, &pair.distance());
+            if !images {
+                touches.put_distance(lane, &pair.distance());
+            }
             if !EQUAL {
                 unequal = unequal | pair.unequal();
             }
         });
-        // Away from periodic faces there is nothing to look up.
-        if motion.faces_move || !shift::all_here(pairs.codes()) {
+        if images {
             for_each_group!(L, lane, {
                 let mut pair = touches.relative::<L>(lane);
                 pair.enter_images(&pairs.codes()[lane..], motion);
