@@ -81,19 +81,19 @@ pub trait Lane:
     /// The records of `WIDTH` particles that begin at these numbers of the slice (index times [`RECORD`]),
     /// transposed: entry `c` holds number `c` of each record.
     fn gather(records: &[Record], offsets: &[u32]) -> [Self; RECORD];
-    /// What `WIDTH` pairs from `place` of their block on need of their records, transposed: position and radius, second minus first; velocity,
-    /// second minus first, and radius, both together; spin and 1/m, both together. `EQUAL`: all radii are, and what
-    /// stands in the place of radii means nothing.
+    /// What `WIDTH` pairs from `place` of their block on need of their records, transposed: position and radius, second
+    /// minus first; velocity, second minus first, and radius, both together; spin and 1/m, both together. `EQUAL`: all
+    /// radii are, and what stands in the place of radii means nothing.
     fn relative<const EQUAL: bool>(pairs: &BlockPairs, place: usize) -> [[Self; 4]; 3];
     /// Spin of the second less that of the first, of `WIDTH` pairs from `place` of their block on.
     fn relative_spin(pairs: &BlockPairs, place: usize) -> [Self; 3];
     /// Transposed store: lane `k` of the four values goes to `rows[k * stride + offset ..][..4]`.
     fn scatter(values: [Self; 4], rows: &mut [f64], stride: usize, offset: usize);
-    /// Transposed store of six numbers: lane `k` of the values goes to `rows[k * stride..][..6]`.
+    /// Transposed store to rows of six, one right behind the other: lane `k` of the values goes to `rows[6 * k..][..6]`.
     #[inline(always)]
-    fn scatter_six([a, b, c, d, e, f]: [Self; 6], rows: &mut [f64], stride: usize) {
-        Self::scatter([a, b, c, d], rows, stride, 0);
-        Self::scatter([c, d, e, f], rows, stride, 2);
+    fn scatter_six([a, b, c, d, e, f]: [Self; 6], rows: &mut [f64]) {
+        Self::scatter([a, b, c, d], rows, 6, 0);
+        Self::scatter([c, d, e, f], rows, 6, 2);
     }
     /// The shapes of `WIDTH` particles, transposed: semi-axes, mean radius, orientation; at the offsets of their
     /// records.

@@ -258,13 +258,7 @@ impl Lane for F64x4 {
         }
     }
     #[inline(always)]
-    fn scatter_six(values: [Self; 6], rows: &mut [f64], stride: usize) {
-        let [a, b, c, d, e, f] = values;
-        if stride != 6 {
-            Self::scatter([a, b, c, d], rows, stride, 0);
-            Self::scatter([c, d, e, f], rows, stride, 2);
-            return;
-        }
+    fn scatter_six([a, b, c, d, e, f]: [Self; 6], rows: &mut [f64]) {
         // The four rows are one run of 24 numbers.
         let rows = &mut rows[..24];
         // SAFETY: the processor has AVX2 (head of this file); the slice holds 24 numbers.

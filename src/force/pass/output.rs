@@ -87,7 +87,8 @@ impl<L: Lane> SphereLines<L> {
     pub fn write_narrow(&self, rows: &mut [f64], touches: &BlockTouches, lane: usize) {
         let [[fx, fy, fz], tangential] = self.forces();
         let [tx, ty, tz] = scale(cross(self.normal, tangential), touches.arms::<L>(lane, true)[0]);
-        L::scatter_six([fx, fy, fz, tx, ty, tz], rows, NARROW_LINE);
+        const { assert!(NARROW_LINE == 6) };
+        L::scatter_six([fx, fy, fz, tx, ty, tz], rows);
     }
 }
 
@@ -118,7 +119,8 @@ impl LineForm {
         let arms = touches.arms::<L>(lane, self.bodies == Bodies::EqualSpheres);
         let mut first = scale(turning, arms[0]);
         if own == NARROW_LINE {
-            L::scatter_six([force[0], force[1], force[2], first[0], first[1], first[2]], rows, stride);
+            L::scatter([force[0], force[1], force[2], first[0]], rows, stride, 0);
+            L::scatter([force[2], first[0], first[1], first[2]], rows, stride, 2);
             return force;
         }
         let mut second = scale(turning, arms[1]);
