@@ -1,8 +1,9 @@
 //! Numbers that the laws compute with: one `f64` or several lanes of it, the same operations in each.
 
-use crate::contact::section::BlockPairs;
+use crate::contact::section::{BlockPairs, CacheLine};
 use crate::state::particles::{RECORD, Record};
 use crate::state::shape::{Number, Shape};
+use std::mem::MaybeUninit;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 #[cfg(target_arch = "x86_64")]
@@ -170,6 +171,15 @@ macro_rules! for_each_group {
     };
 }
 pub(crate) use for_each_group;
+
+/// Has the compiler align the stack of the function that this is fitted into to cache lines. Vectors for which registers are too
+/// few are kept there; without, it would not know in time that it has to, and such a vector may lie across two lines or two
+/// memory pages, which can cost half of a loop's time.
+#[inline(always)]
+pub fn align_stack() {
+    let line = MaybeUninit::<CacheLine>::uninit();
+    std::hint::black_box(line.as_ptr());
+}
 
 /// Whether these values have outgrown the nearest caches, so that asking ahead pays.
 #[inline(always)]

@@ -76,23 +76,24 @@ pub fn split_last_branch(branches: &[MaxwellBranch], count: usize) -> Vec<Maxwel
 /// - `midpoint`: W (3.13), (3.14): `F_k ← F_k e^{−x} + 3/2 C_k e^{−x/2} √δ_mid Δδ`, the long-term spring being
 ///   the branch that never relaxes (it drifts by rounding and by the midpoint rule's error).
 ///
-/// The fast limit is Hertz with Σ E_k, the slow one Hertz with E_∞. Memory: the overlap of the last
-/// step and every branch's force, unclipped; only the total is clipped.
+/// The fast limit is Hertz with Σ E_k, the slow one Hertz with E_∞. Memory: what the next increment starts from, √R_eff
+/// δ^{3/2} (`exact`) or the overlap (`midpoint`), and every branch's force, unclipped; only the total is clipped.
 ///
 /// Energies: branch k holds `F_k δ − 3/5 C_k δ^{5/2}` and dissipates at the rate `F_k δ/τ_k`, whose integral
-/// over a step is `δ_mid (C_k Δ(δ^{3/2}) − ΔF_k)`: the ledger closes to second order in Δt however short τ_k
-/// is. The energy held is counted from the state that vanishes with the overlap, so it is negative in a
+/// over a step is `δ_mid (C_k Δ(δ^{3/2}) − ΔF_k)`, with δ_mid = δ − ½ δ̇ Δt: the ledger closes to second order in Δt however
+/// short τ_k is. The energy held is counted from the state that vanishes with the overlap, so it is negative in a
 /// relaxed contact, and the dissipation may be negative on unloading: Radok's superposition holds
 /// for growing contacts. What clipping takes out counts as damping, of either sign.
 ///
 /// Between ellipsoids δ/f_2 and R_e of the elliptical contact take the places of δ and R_eff, as in Hertz's law: the
-/// force keeps both elastic limits. This is an extension of W, which treats spheres. While a contact rolls to places
-/// of other curvature the branches keep the force they have, and the energies are those of the present curvature.
+/// force keeps both elastic limits. This is an extension of W, which treats spheres. Where a contact rolls to places of
+/// other curvature, `exact` counts the change of √R_e (δ/f_2)^{3/2} with the increment and `midpoint` does not; the energies
+/// are those of the present curvature.
 ///
 /// # Source
 /// W (3.7), (3.11)–(3.14); prefactor by the errata (√R_eff/(1−ν²) throughout).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MaxwellZener<const BRANCHES: usize> {
+pub struct MaxwellZener<const BRANCHES: usize, const MIDPOINT: bool> {
     /// 2/3 E_∞/(1−ν²) \[Pa\] of the closed-form spring, 0 when the last branch stands for it.
     spring: f64,
     /// 2/3 E_k/(1−ν²) \[Pa\].
@@ -103,14 +104,13 @@ pub struct MaxwellZener<const BRANCHES: usize> {
     decay: [f64; BRANCHES],
     /// What multiplies the step's increment.
     gain: [f64; BRANCHES],
-    midpoint: bool,
     spontaneous: f64,
     dashpot: Dashpot,
     floor: f64,
     time_step: f64,
 }
 
-impl<const BRANCHES: usize> MaxwellZener<BRANCHES> {
+impl<const BRANCHES: usize, const MIDPOINT: bool> MaxwellZener<BRANCHES, MIDPOINT> {
     /// From the pair's constants and the normal law's parameters. `BRANCHES` is at least the number of
     /// the material's Maxwell branches (`exact`) or one more than that (`midpoint`).
     #[must_use]
@@ -118,11 +118,10 @@ impl<const BRANCHES: usize> MaxwellZener<BRANCHES> {
         let properties = &pair.properties;
         let per_young = 2.0 / 3.0 / (1.0 - properties.poisson_ratio[0] * properties.poisson_ratio[0]);
         let long_term = per_young * properties.young_modulus[0];
-        let midpoint = is_midpoint(pair);
-        let branches = split_last_branch(&properties.maxwell[0], if midpoint { BRANCHES - 1 } else { BRANCHES });
+        let branches = split_last_branch(&properties.maxwell[0], if MIDPOINT { BRANCHES - 1 } else { BRANCHES });
         let coefficient =
             std::array::from_fn(|k| branches.get(k).map_or(long_term, |branch| branch.modulus * per_young));
-        let spring = if midpoint { 0.0 } else { long_term };
+        let spring = if MIDPOINT { 0.0 } else { long_term };
         let spontaneous = coefficient.iter().fold(spring, |sum, c| sum + c);
         Self {
             spring,
@@ -130,7 +129,6 @@ impl<const BRANCHES: usize> MaxwellZener<BRANCHES> {
             rate: std::array::from_fn(|k| branches.get(k).map_or(0.0, |branch| 1.0 / branch.relaxation_time)),
             decay: [1.0; BRANCHES],
             gain: coefficient,
-            midpoint,
             spontaneous,
             // The spontaneous spring is 4/3 E_eff √R_eff δ^{3/2}.
             dashpot: Dashpot::new(&pair.normal, 0.75 * spontaneous, properties.restitution),
@@ -152,28 +150,25 @@ pub fn build<V: NormalVisitor>(pair: &PairConfig, visitor: V) -> V::Output {
     let properties = &pair.properties;
     let branches = properties.maxwell[0].len();
     macro_rules! law {
-        ($branches:literal, $springs:literal) => {
-            visitor.visit(MaxwellZener::<$branches>::new(pair), ShearSprings::<$springs>::relaxing(properties))
+        ($branches:literal, $springs:literal, $midpoint:literal) => {
+            visitor
+                .visit(MaxwellZener::<$branches, $midpoint>::new(pair), ShearSprings::<$springs>::relaxing(properties))
         };
     }
-    match (branches, is_midpoint(pair)) {
-        (1, false) => law!(1, 2),
-        (2, false) => law!(2, 3),
-        (3..=4, false) => law!(4, 5),
-        (5..=8, false) => law!(8, 9),
-        (1, true) => law!(2, 2),
-        (2, true) => law!(3, 3),
-        (3..=4, true) => law!(5, 5),
-        (5..=8, true) => law!(9, 9),
+    match (branches, pair.normal.word(SCHEME.name) == "midpoint") {
+        (1, false) => law!(1, 2, false),
+        (2, false) => law!(2, 3, false),
+        (3..=4, false) => law!(4, 5, false),
+        (5..=8, false) => law!(8, 9, false),
+        (1, true) => law!(2, 2, true),
+        (2, true) => law!(3, 3, true),
+        (3..=4, true) => law!(5, 5, true),
+        (5..=8, true) => law!(9, 9, true),
         _ => panic!("maxwell_zener built with {branches} branches, which its check refuses"),
     }
 }
 
-fn is_midpoint(pair: &PairConfig) -> bool {
-    pair.normal.word(SCHEME.name) == "midpoint"
-}
-
-impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
+impl<const BRANCHES: usize, const MIDPOINT: bool> NormalLaw for MaxwellZener<BRANCHES, MIDPOINT> {
     const MEMORY: usize = 1 + BRANCHES;
 
     fn columns(&self) -> Vec<Column> {
@@ -181,7 +176,8 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
             name: if rate == 0.0 { "long_term_force".to_owned() } else { format!("branch_{}_force", k + 1) },
             unit: "N",
         });
-        std::iter::once(Column { name: "overlap".to_owned(), unit: "m" }).chain(forces).collect()
+        let (name, unit) = if MIDPOINT { ("overlap", "m") } else { ("hertzian", "m^2") };
+        std::iter::once(Column { name: name.to_owned(), unit }).chain(forces).collect()
     }
 
     fn prepare(&mut self, time_step: f64) {
@@ -189,7 +185,7 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
         for k in 0..BRANCHES {
             let x = time_step * self.rate[k];
             self.decay[k] = libm::exp(-x);
-            self.gain[k] = self.coefficient[k] * if self.midpoint { 1.5 * libm::exp(-0.5 * x) } else { mean_decay(x) };
+            self.gain[k] = self.coefficient[k] * if MIDPOINT { 1.5 * libm::exp(-0.5 * x) } else { mean_decay(x) };
         }
     }
 
@@ -203,14 +199,21 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, memory: &mut [L]) -> NormalResponse<L> {
         let (radius, overlap, last) = (touch.effective_radius, touch.overlap, memory[0]);
-        let mean = L::splat(0.5) * (overlap + last);
         let factor = touch.overlap_factor;
-        let (scaled, last_scaled) = (overlap / factor, last / factor);
+        let scaled = overlap / factor;
         let hertz_radius = (radius * scaled).sqrt();
-        // √R_eff δ^{3/2} and its change over the step.
+        // √R_eff δ^{3/2}.
         let hertzian = hertz_radius * scaled;
-        let change = hertzian - (radius * last_scaled).sqrt() * last_scaled;
-        let increment = if self.midpoint { (radius * (mean / factor)).sqrt() * (scaled - last_scaled) } else { change };
+        // Overlap in the middle of the step, change of √R_eff δ^{3/2} over it, and what the branches get.
+        let (mean, change, increment) = if MIDPOINT {
+            let scaled_last = last / factor;
+            let mean = L::splat(0.5) * (overlap + last);
+            let change = hertzian - (radius * scaled_last).sqrt() * scaled_last;
+            (mean, change, (radius * (mean / factor)).sqrt() * (scaled - scaled_last))
+        } else {
+            let change = hertzian - last;
+            (overlap - L::splat(0.5 * self.time_step) * touch.overlap_rate, change, change)
+        };
 
         let spring = L::splat(self.spring) * hertzian;
         let mut held = spring;
@@ -229,7 +232,7 @@ impl<const BRANCHES: usize> NormalLaw for MaxwellZener<BRANCHES> {
             }
             energies.viscous = energies.viscous + mean * (coefficient * change - (force - before));
         }
-        memory[0] = overlap;
+        memory[0] = if MIDPOINT { overlap } else { hertzian };
 
         let radius_per_factor = hertz_radius / factor;
         let dashpot = self.dashpot.coefficient(radius_per_factor, touch.effective_mass);

@@ -144,11 +144,14 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
     /// Of each spring [`Turning::early`].
     #[inline(always)]
     fn early<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &[L], early: &mut [L]) {
+        let mut stored = [[L::splat(0.0); 3]; SPRINGS];
+        for (k, stored) in stored.iter_mut().enumerate() {
+            *stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
+        }
         let turning = Turning::new(touch, self.time_step);
-        for k in 0..SPRINGS {
-            let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
-            let both = turning.early(stored, normal.contact_radius, memory[3 * SPRINGS]);
-            early[2 * k..2 * k + 2].copy_from_slice(&both);
+        let both = turning.early(&stored, normal.contact_radius, memory[3 * SPRINGS]);
+        for (pair, both) in early.chunks_mut(2).zip(both) {
+            pair.copy_from_slice(&both);
         }
     }
 

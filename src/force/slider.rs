@@ -23,7 +23,7 @@ impl<L: Lane> Turning<L> {
     #[inline(always)]
     #[must_use]
     pub fn apply(&self, stored: Vector<L>, stiffness: L, last: L) -> Vector<L> {
-        let [along, share] = self.early(stored, stiffness, last);
+        let [[along, share]] = self.early(&[stored], stiffness, last);
         scale(self.turn(stored, along), share)
     }
 
@@ -32,13 +32,13 @@ impl<L: Lane> Turning<L> {
     #[inline(always)]
     #[must_use]
     pub fn turn(&self, stored: Vector<L>, along: L) -> Vector<L> {
-        add(sub(stored, scale(self.normal, along)), scale(cross(self.normal, stored), self.angle))
+        add(sub(stored, scale(self.normal, along)), cross(scale(self.normal, self.angle), stored))
     }
 
-    /// The part of the vector along n, and what brings the turned vector to the length that it has after the step.
+    /// The parts of some vectors along n, and what brings each turned vector to the length that it has after the step.
     ///
     /// It shrinks with the stiffness: a spring keeps `min(1, stiffness/last stiffness)` of its force, so that
-    /// unloading creates no energy. A vector without a last stiffness (first touch) is zero.
+    /// unloading creates no energy. At first touch, without a last stiffness, a vector must be zero.
     ///
     /// Projection and turn leave the share `1 − w = (1 − t)(1 + φ²)` of the squared length, t the squared cosine between
     /// vector and n. What restores it, `1/√(1 − w)`, is a series without a root, up to w³: where a step turns the
@@ -46,20 +46,35 @@ impl<L: Lane> Turning<L> {
     /// so that a vector that turns too fast shrinks.
     #[inline(always)]
     #[must_use]
-    pub fn early(&self, stored: Vector<L>, stiffness: L, last: L) -> [L; 2] {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let along = dot(stored, self.normal);
-        let square = dot(stored, stored);
-        // One division for two, by |stored|² and by the last stiffness.
-        let both = square * last;
-        let inverse = one / both;
-        let tilt = along * along * (last * inverse);
-        let lost = (tilt + self.angle * self.angle * (tilt - one)).max(-one);
-        let stretch = one + lost * (L::splat(0.5) + lost * (L::splat(0.375) + lost * L::splat(0.3125)));
-        let kept = (stiffness * (square * inverse)).min(one);
-        [along, (stretch * kept).only(both.greater(zero))]
+    pub fn early<const N: usize>(&self, stored: &[Vector<L>; N], stiffness: L, last: L) -> [[L; 2]; N] {
+        let (half, one, least) = (L::splat(0.5), L::splat(1.0), L::splat(LEAST));
+        let last = least.max(last);
+        let turned = half * (self.angle * self.angle);
+        let weight = (half + turned) * last;
+        let mut early = [[one; 2]; N];
+        // One division for all: by the last stiffness and the squared lengths of two vectors.
+        for (pair, early) in stored.chunks(2).zip(early.chunks_mut(2)) {
+            let mut squares = [one; 2];
+            for (square, stored) in squares.iter_mut().zip(pair) {
+                *square = least.max(dot(*stored, *stored));
+            }
+            let product = squares[0] * squares[1];
+            let inverse = one / (product * last);
+            let kept = (stiffness * (product * inverse)).min(one);
+            for (k, (stored, early)) in pair.iter().zip(early).enumerate() {
+                let along = dot(*stored, self.normal);
+                // w/2.
+                let lost = (along * along * (squares[1 - k] * weight) * inverse - turned).max(-half);
+                let stretch = (one + lost) + lost * lost * (L::splat(1.5) + L::splat(2.5) * lost);
+                *early = [along, stretch * kept];
+            }
+        }
+        early
     }
 }
+
+/// In place of smaller squared lengths and last stiffnesses: products of three of them are still above the smallest numbers.
+const LEAST: f64 = 1e-100;
 
 /// Coulomb limit `coefficient × F_n × arm`, 0 under a tensile force (clipping off).
 #[inline(always)]

@@ -9,7 +9,7 @@ use crate::contact::ends::ChunkEnds;
 use crate::contact::list::CHUNK;
 use crate::contact::section::BLOCK;
 use crate::force::lane::portable::Portable;
-use crate::force::lane::{Lane, SHAPE, prefetch};
+use crate::force::lane::{Lane, SHAPE, align_stack, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
@@ -229,8 +229,9 @@ fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
 /// Ellipsoids turn before, in the lanes `W` side by side.
 #[inline(always)]
 fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    let Batch { range, chunk, mut lines, loads, motion } = batch;
     const { assert!(L::WIDTH == 4) };
+    align_stack();
+    let Batch { range, chunk, mut lines, loads, motion } = batch;
     lines.sum_all::<L>(&chunk, loads);
     if motion.ledger {
         for (place, (index, load)) in range.clone().zip(&*loads).enumerate() {

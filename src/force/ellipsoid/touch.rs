@@ -6,7 +6,7 @@ use super::normal::{Ellipsoids, Found};
 use super::{radii_tensor, shape_tensor, support, tangents};
 use crate::contact::section::{BLOCK, CacheLine, Pairs, Section};
 use crate::force::geometry::{self, CellMotion, PairTouch, Relative, TOUCH_TOLERANCE};
-use crate::force::lane::{Lane, Vector, add, cross, dot, scale, sub};
+use crate::force::lane::{Lane, Vector, add, align_stack, cross, dot, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::Touch;
@@ -82,6 +82,7 @@ impl BlockSource<'_> {
 
     #[inline(always)]
     fn fill_lanes<L: Lane>(&self, touches: &mut BlockTouches) {
+        align_stack();
         for lane in (0..BLOCK).step_by(L::WIDTH) {
             let touch = self.touch::<L>(lane);
             touches.put_any(lane, &touch.pair, self.surroundings.range);

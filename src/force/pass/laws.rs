@@ -7,7 +7,7 @@
 use super::output::{NARROW_LINE, Output, SphereLines};
 use crate::contact::section::CacheLine;
 use crate::force::composition::MAX_MEMORY;
-use crate::force::lane::{Lane, for_each_group};
+use crate::force::lane::{Lane, align_stack, for_each_group};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::law::{Column, ContactLaw, MAX_EARLY, RollingLaw};
@@ -106,6 +106,7 @@ impl<C: ContactLaw> Stages<C> {
         rolling: Option<&dyn RollingStage>,
         output: Option<&mut Output>,
     ) {
+        align_stack();
         self.normal::<L, DETAILED>(batch);
         if let Some(output) = output {
             if let Some(rolling) = rolling {
@@ -231,6 +232,7 @@ impl<R: RollingLaw> Rolling<R> {
     #[inline(always)]
     fn lanes<L: Lane, const DETAILED: bool>(&self, batch: &mut LawBatch, first: usize, lasts: bool) {
         const { assert!(R::MEMORY <= MAX_MEMORY, "a rolling law has more memory columns than the loop holds") };
+        align_stack();
         let zero = L::splat(0.0);
         for (block, touches) in batch.touches.iter_mut().enumerate() {
             let own = &mut batch.memory[block * batch.columns + first..][..R::MEMORY];

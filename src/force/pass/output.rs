@@ -3,7 +3,7 @@
 use super::laws::LawBatch;
 use super::{Bodies, LEDGER_STRIDE};
 use crate::contact::section::BLOCK;
-use crate::force::lane::{Lane, Vector, add, cross, dot, for_each_group, scale, sub};
+use crate::force::lane::{Lane, Vector, add, align_stack, cross, dot, for_each_group, scale, sub};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
@@ -205,6 +205,7 @@ impl Output<'_> {
 
     #[inline(always)]
     fn write_lanes<L: Lane>(&mut self, batch: &mut LawBatch, normals: usize) {
+        align_stack();
         let Self { lines, form } = self;
         for (block, touches) in batch.touches.iter().enumerate() {
             let rows = lines.block(block, form.stride);

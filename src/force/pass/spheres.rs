@@ -4,7 +4,7 @@ use super::{BodyData, Excess, LIST_AHEAD, RECORDS_AHEAD, Source};
 use crate::contact::section::{BLOCK, Pairs};
 use crate::contact::shift;
 use crate::force::geometry::{self, Relative};
-use crate::force::lane::{Lane, for_each_group, is_far, prefetch};
+use crate::force::lane::{Lane, align_stack, for_each_group, is_far, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
 use crate::force::simd::Simd;
@@ -43,6 +43,7 @@ fn geometry_avx512<const EQUAL: bool>(source: &Source, touches: &mut [BlockTouch
 
 #[inline(always)]
 fn geometry_of<L: Lane, const EQUAL: bool>(source: &Source, touches: &mut [BlockTouches; BATCH], each: Each) -> Excess {
+    align_stack();
     let Source { input, bodies: BodyData { records, .. }, section, content, ref blocks, .. } = *source;
     let (pairs, far) = (section.pairs(records), is_far(records));
     let mut excess = None;
