@@ -3,6 +3,7 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
+use super::displacement::StepResult;
 use super::gather::Lines;
 use super::rotation::{Body, Rotation, Spins};
 use crate::contact::ends::ChunkEnds;
@@ -32,6 +33,8 @@ pub struct StepMotion {
     pub gravity: [f64; 3],
     /// Affine factor of the positions per axis (BCT; 1 in BC).
     pub scale: [f64; 3],
+    /// Cell sides before the step \[m\].
+    pub previous_sides: [f64; 3],
     /// Cell sides after the step \[m\].
     pub sides: [f64; 3],
     /// Cell sides when the reference positions were taken \[m\].
@@ -46,41 +49,18 @@ pub struct StepMotion {
     pub ledger: bool,
     /// Follow orientations.
     pub orientation: bool,
+    /// Measure displacements since the reference positions; otherwise only speeds are looked at.
+    pub measure: bool,
     /// Instructions to use.
     pub simd: Simd,
 }
 
-/// What a step brings back.
-#[derive(Debug, Default)]
-pub struct StepResult {
-    /// Largest squared displacement since the reference positions, relative to the affine motion of the
-    /// cell \[m²\].
-    pub max_displacement_squared: f64,
-    /// Particles that crossed a periodic face, with the number of images per axis.
-    pub wrapped: Vec<(u32, [i32; 3])>,
-    /// Local index of a particle that left the cell through a wall or is not a number.
-    pub lost: Option<u32>,
-}
-
-impl StepResult {
-    /// A squared displacement above all before, or one that is not a number; gives the largest now.
-    #[cold]
-    fn take_displacement(&mut self, squared: f64, particle: u32) -> f64 {
-        if squared.is_nan() {
-            self.lost = Some(particle);
-        } else {
-            self.max_displacement_squared = squared;
-        }
-        self.max_displacement_squared
-    }
-
-    /// Join with what other particles brought.
-    pub fn absorb(&mut self, mut other: Self) {
-        if other.max_displacement_squared > self.max_displacement_squared {
-            self.max_displacement_squared = other.max_displacement_squared;
-        }
-        self.wrapped.append(&mut other.wrapped);
-        self.lost = self.lost.or(other.lost);
+impl StepMotion {
+    /// Change of position over half-step velocity per axis, `½ (1 + scale) Δt` \[s\].
+    #[inline]
+    #[must_use]
+    pub fn drift(&self) -> [f64; 3] {
+        self.scale.map(|scale| 0.5 * (1.0 + scale) * self.time_step)
     }
 }
 
@@ -242,16 +222,18 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     if !slice.shape.is_empty() {
         turn_all::<W>(slice, range.clone(), loads, motion);
     }
-    if motion.rotation && slice.shape.is_empty() {
-        move_all::<L, true>(slice, range, loads, motion, result);
-    } else {
-        move_all::<L, false>(slice, range, loads, motion, result);
+    match (motion.rotation && slice.shape.is_empty(), motion.measure) {
+        (true, true) => move_all::<L, true, true>(slice, range, loads, motion, result),
+        (true, false) => move_all::<L, true, false>(slice, range, loads, motion, result),
+        (false, true) => move_all::<L, false, true>(slice, range, loads, motion, result),
+        (false, false) => move_all::<L, false, false>(slice, range, loads, motion, result),
     }
 }
 
-/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation.
+/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation. `MEASURE`: see
+/// [`StepMotion::measure`].
 #[inline(always)]
-fn move_all<L: Lane, const TURN: bool>(
+fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
     slice: &mut Slice,
     range: Range<usize>,
     loads: &[[f64; 8]],
@@ -263,7 +245,7 @@ fn move_all<L: Lane, const TURN: bool>(
     let vector = three([1.0; 3], 0.0).greater(zero);
     let (old, new) = (motion.previous_time_step, motion.time_step);
     let (kick, half) = (three([0.5 * (old + new); 3], 0.0), three([0.5 * new; 3], 0.0));
-    let drift = three([0, 1, 2].map(|k| 0.5 * (1.0 + motion.scale[k]) * new), 0.0);
+    let drift = three(motion.drift(), 0.0);
     let scale = three(motion.scale, 1.0);
     let (gravity, falls) = (three(motion.gravity, 0.0), motion.gravity != [0.0; 3]);
     let sides = three(motion.sides, f64::INFINITY);
@@ -271,11 +253,14 @@ fn move_all<L: Lane, const TURN: bool>(
     let bodies = slice.record[range.clone()].iter_mut().zip(&mut slice.velocity[range.clone()]);
     let turning = slice.spin[range.clone()].iter_mut().zip(&mut slice.reference[range.clone()]);
     let mut farthest = result.max_displacement_squared;
-    for ((((record, velocity), (spin, reference)), load), index) in bodies.zip(turning).zip(loads).zip(range) {
+    let (mut swiftest, mut sum) = (zero, zero);
+    for ((((record, velocity), (spin, reference)), load), index) in bodies.zip(turning).zip(loads).zip(range.clone()) {
         // What a later chunk needs and no contact has touched.
         prefetch(std::slice::from_ref(velocity), AHEAD, 1);
         prefetch(std::slice::from_ref(spin), AHEAD, 1);
-        prefetch(std::slice::from_ref(reference), AHEAD, 1);
+        if MEASURE {
+            prefetch(std::slice::from_ref(reference), AHEAD, 1);
+        }
         let (force, torque) = (L::load(&load[..4]), L::load(&load[4..]));
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
         let inverse_mass = L::splat(numbers[11]);
@@ -285,6 +270,10 @@ fn move_all<L: Lane, const TURN: bool>(
         }
         let mut half_velocity = L::load(velocity) + kick * acceleration;
         let mut position = scale * L::load(&numbers[..4]) + drift * half_velocity;
+        if !MEASURE {
+            let squares = half_velocity * half_velocity;
+            (swiftest, sum) = (swiftest.max(squares), sum + squares);
+        }
         // The fourth numbers come from splats: stores of some lanes only are slow.
         if TURN {
             let angular = torque * L::splat(spin[3]);
@@ -316,16 +305,34 @@ fn move_all<L: Lane, const TURN: bool>(
         half_velocity.store(velocity);
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
         L::select(vector, half_velocity + half * acceleration, L::splat(numbers[3])).store(&mut numbers[4..8]);
+        if !MEASURE {
+            continue;
+        }
         let moved = position - stretch * three(*reference, 0.0);
-        let mut squares = [0.0; 4];
-        (moved * moved).store(&mut squares);
-        let squared = squares[0] + squares[1] + squares[2];
+        let [x, y, z] = leading(moved * moved);
+        let squared = x + y + z;
         // So that NaN is found.
         let nearer = squared <= farthest;
         if !nearer {
             farthest = result.take_displacement(squared, (slice.start + index) as u32);
         }
     }
+    if !MEASURE {
+        result.take_velocities(leading(swiftest));
+        // Largest values may leave out NaN, sums do not.
+        if leading(sum).iter().any(|sum| sum.is_nan()) {
+            let stray = range.clone().find(|&index| slice.velocity[index].iter().any(|number| number.is_nan()));
+            result.lost = Some((slice.start + stray.unwrap_or(range.start)) as u32);
+        }
+    }
+}
+
+/// The first three of four lanes.
+#[inline(always)]
+fn leading<L: Lane>(lanes: L) -> [f64; 3] {
+    let mut values = [0.0; 4];
+    lanes.store(&mut values);
+    [values[0], values[1], values[2]]
 }
 
 /// Turn ellipsoids, as many side by side as there are lanes where that many free ones follow each other.

@@ -6,6 +6,8 @@ use crate::contact::ends::End;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::force::pass::PairPass;
+use crate::integrate::displacement::Displacement;
+use crate::integrate::leap_frog::StepMotion;
 use crate::neighbour::tiles;
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
@@ -29,6 +31,15 @@ pub struct ListBudget {
     verlet_sides: [f64; 3],
     /// Sum over earlier contact lists of the largest displacement during each \[m\].
     displaced: f64,
+    /// Displacement since the contact list was made.
+    pub displacement: Displacement,
+}
+
+/// What motion has made stale.
+enum Stale {
+    Nothing,
+    ContactList,
+    VerletList,
 }
 
 impl Model {
@@ -59,41 +70,69 @@ impl Model {
 }
 
 impl Simulation {
-    /// Make anew what the motion since the last time has made stale; `displacement` is the largest one
-    /// of all ranks, relative to the affine motion of the cell.
-    pub(super) fn refresh_lists(&mut self, displacement: f64) -> Result<()> {
-        let sides = self.global.sides;
-        let stretch = |from: [f64; 3]| {
-            let factors = [0, 1, 2].map(|k| sides[k] / from[k]);
-            let low = factors.iter().fold(f64::INFINITY, |m, f| if *f < m { *f } else { m });
-            let high = factors.iter().fold(1.0_f64, |m, f| if *f > m { *f } else { m });
-            (low, high)
-        };
+    /// Make anew what the motion since the last time has made stale; `farthest` is the largest
+    /// [`StepResult::farthest`](crate::integrate::displacement::StepResult::farthest) of all ranks.
+    pub(super) fn refresh_lists(&mut self, motion: &StepMotion, farthest: f64) -> Result<()> {
+        self.budget.displacement.follow(motion, farthest);
+        let Displacement { bound, step, .. } = self.budget.displacement;
+        match self.stale(bound) {
+            // So close that the next step needs to be measured, unless particles are accelerated to twice their speed.
+            Stale::Nothing => {
+                self.budget.displacement.measure = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing)
+            }
+            Stale::ContactList => {
+                self.timers.start(Stage::Neighbours);
+                self.update_ghosts();
+                self.budget.displaced = self.displaced(bound);
+                self.rebuild_contacts()?;
+                self.timers.contact_rebuilds += 1;
+                self.timers.stop();
+            }
+            Stale::VerletList => {
+                self.timers.start(Stage::Neighbours);
+                self.update_ghosts();
+                let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
+                self.rebuild_all(memory)?;
+                self.timers.verlet_rebuilds += 1;
+                self.timers.stop();
+            }
+        }
+        Ok(())
+    }
+
+    /// What is stale if no particle has moved farther than `displacement` since the contact list was made, relative to
+    /// the affine motion of the cell.
+    fn stale(&self, displacement: f64) -> Stale {
         let largest_sum = 2.0 * self.model.max_radius;
         // A pair farther than sum + skin then is farther than sum now, if
         // low·(sum + skin) − 2·displacement > sum, for any sum up to the largest. A small part of the skin
         // is kept for rounding.
         let room =
             |low: f64, skin: f64| low * skin - (if low < 1.0 { 1.0 - low } else { 0.0 }) * largest_sum - 1e-6 * skin;
-        let (inner_low, inner_high) = stretch(self.budget.reference_sides);
-        let (outer_low, _) = stretch(self.budget.verlet_sides);
-        let displaced = self.budget.displaced * inner_high + displacement;
-        if 2.0 * displaced >= room(outer_low, self.model.outer_skin()) - self.model.inner_skin() {
-            self.timers.start(Stage::Neighbours);
-            self.update_ghosts();
-            let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
-            self.rebuild_all(memory)?;
-            self.timers.verlet_rebuilds += 1;
-            self.timers.stop();
+        let (outer_low, _) = self.stretch(self.budget.verlet_sides);
+        let (inner_low, _) = self.stretch(self.budget.reference_sides);
+        let outer_room = room(outer_low, self.model.outer_skin()) - self.model.inner_skin();
+        if 2.0 * self.displaced(displacement) >= outer_room {
+            Stale::VerletList
         } else if 2.0 * displacement >= room(inner_low, self.model.inner_skin()) {
-            self.timers.start(Stage::Neighbours);
-            self.update_ghosts();
-            self.budget.displaced = displaced;
-            self.rebuild_contacts()?;
-            self.timers.contact_rebuilds += 1;
-            self.timers.stop();
+            Stale::ContactList
+        } else {
+            Stale::Nothing
         }
-        Ok(())
+    }
+
+    /// The displacement since the Verlet list was made, given the one since the contact list.
+    fn displaced(&self, displacement: f64) -> f64 {
+        let (_, high) = self.stretch(self.budget.reference_sides);
+        self.budget.displaced * high + displacement
+    }
+
+    /// Smallest factor by which sides have grown, and the largest or 1.
+    fn stretch(&self, from: [f64; 3]) -> (f64, f64) {
+        let factors = [0, 1, 2].map(|k| self.global.sides[k] / from[k]);
+        let low = factors.iter().fold(f64::INFINITY, |m, f| if *f < m { *f } else { m });
+        let high = factors.iter().fold(1.0_f64, |m, f| if *f > m { *f } else { m });
+        (low, high)
     }
 
     /// Particles to their owners, ghosts, Verlet list, contact list. `memory` holds at least the contacts
@@ -139,7 +178,7 @@ impl Simulation {
         self.candidates = region.candidates(&self.particles, &strips);
         self.reference.reset(&self.particles);
         self.model.lists.start(&mut self.contacts, &self.particles, &mut self.candidates, strips, inner_strips);
-        self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0 };
+        self.budget = ListBudget { reference_sides: sides, verlet_sides: sides, displaced: 0.0, ..self.budget };
         self.rebuild_contacts()?;
         self.model.lists.restore(&mut self.contacts, &self.particles, &memory);
         Ok(())
@@ -159,6 +198,7 @@ impl Simulation {
     fn rebuild_contacts(&mut self) -> Result<()> {
         let sides = self.global.sides;
         self.budget.reference_sides = sides;
+        self.budget.displacement = Displacement { bound: 0.0, measure: false, ..self.budget.displacement };
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
         let mut largest = [self.contacts.largest_number() as f64, self.contacts.lines as f64];

@@ -26,7 +26,8 @@ use crate::force::law::Column;
 use crate::force::observe::{Observation, Wanted};
 use crate::force::pass::{BodyData, LEDGER_STRIDE, PairPass, PassInput};
 use crate::force::simd::Simd;
-use crate::integrate::leap_frog::{Reference, Slice, StepMotion, StepResult};
+use crate::integrate::displacement::StepResult;
+use crate::integrate::leap_frog::{Reference, Slice, StepMotion};
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::{LoadProgramme, StepPlan};
 use crate::neighbour::verlet::Candidates;
@@ -267,11 +268,12 @@ impl Simulation {
             self.begin_increment();
         }
         let strain = self.global.strain;
-        let (moved, fault) = self.move_on(&plan, looking);
+        let motion = self.step_motion(&plan);
+        let (moved, fault) = self.move_on(&plan, &motion, looking);
         if self.is_quasi_static() {
             self.after_substep(strain);
         }
-        self.agree_on_step(fault, &moved, requests)
+        self.agree_on_step(fault, &moved, &motion, requests)
     }
 
     /// Observe the present state without moving on (the end of a run).
@@ -373,9 +375,8 @@ impl Simulation {
 
     /// Contacts, sum and motion. While the ghosts fly, those particles move that no other rank sees. `fresh`: the
     /// ghosts are up to date.
-    fn move_on(&mut self, plan: &StepPlan, fresh: bool) -> (StepResult, Option<PassFault>) {
+    fn move_on(&mut self, plan: &StepPlan, motion: &StepMotion, fresh: bool) -> (StepResult, Option<PassFault>) {
         let cell = self.cell_motion();
-        let motion = self.step_motion(plan);
         let input = self.pass_input(&cell);
         let relaxed = self.is_quasi_static();
         if self.contacts.strips.len() > 1 {
@@ -394,7 +395,7 @@ impl Simulation {
             let fault = phase.kept(contacts, &[Partners::Apart, Partners::Wall], bodies(particles), lines);
             timers.start(Stage::Step);
             let (slice, _) = Slice::new(particles, reference).split(moving);
-            let (result, near_fault) = phase.near(contacts, 0..inner, slice, lines, &motion);
+            let (result, near_fault) = phase.near(contacts, 0..inner, slice, lines, motion);
             (result, fault.or(near_fault))
         };
         let (mut result, mut fault) = if fresh {
@@ -415,7 +416,7 @@ impl Simulation {
             let ghost_fault = phase.kept(contacts, &[Partners::Ghost], bodies(particles), lines);
             timers.start(Stage::Step);
             let (_, slice) = Slice::new(particles, reference).split(moving);
-            let (border, near_fault) = phase.near(contacts, inner..strips, slice, lines, &motion);
+            let (border, near_fault) = phase.near(contacts, inner..strips, slice, lines, motion);
             result.absorb(border);
             fault = fault.or(ghost_fault).or(near_fault);
         }
@@ -440,6 +441,7 @@ impl Simulation {
             time_step: plan.time_step,
             gravity: self.model.config.gravity,
             scale: if kinematics == Kinematics::Bct { [0, 1, 2].map(|k| sides[k] / old[k]) } else { [1.0; 3] },
+            previous_sides: old,
             sides,
             reference_sides: self.budget.reference_sides,
             // In the quasi-static routine the face jumps and then rests, and so does what goes through it.
@@ -452,6 +454,7 @@ impl Simulation {
             rotation: self.model.rotation,
             ledger: extras.ledger,
             orientation: extras.orientation,
+            measure: self.budget.displacement.measure,
             simd: self.model.simd,
         }
     }
@@ -461,11 +464,11 @@ impl Simulation {
         &mut self,
         pass_fault: Option<PassFault>,
         moved: &StepResult,
+        motion: &StepMotion,
         requests: Requests,
     ) -> Result<Requests> {
         let faulty = pass_fault.is_some() || moved.lost.is_some();
-        let mut values =
-            [moved.max_displacement_squared, f64::from(u8::from(faulty)), requests.stop, requests.checkpoint];
+        let mut values = [moved.farthest(motion), f64::from(u8::from(faulty)), requests.stop, requests.checkpoint];
         self.timers.start(Stage::Reduce);
         self.comm.max_f64(&mut values);
         self.timers.stop();
@@ -473,7 +476,7 @@ impl Simulation {
             let mine = self.describe_pass_fault(pass_fault).and_then(|()| self.describe_lost(moved.lost));
             agree(&self.comm, mine)?;
         }
-        self.refresh_lists(values[0].sqrt())?;
+        self.refresh_lists(motion, values[0])?;
         Ok(Requests { stop: values[2], checkpoint: values[3] })
     }
 

@@ -8,8 +8,9 @@ use crate::force::lane::{is_far, prefetch};
 use crate::force::observe::{Observation, Observed, Wanted};
 use crate::force::pass::{BodyData, Job, LineRing, PairPass, PassInput};
 use crate::force::touches::{BATCH, BlockTouches};
+use crate::integrate::displacement::StepResult;
 use crate::integrate::gather::Lines;
-use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion, StepResult};
+use crate::integrate::leap_frog::{self, Batch, Slice, StepMotion};
 use std::ops::Range;
 
 /// Output lines: those kept for the step and one ring per strip.
