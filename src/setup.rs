@@ -15,7 +15,7 @@ use crate::force::pass::{Bodies, PairPass};
 use crate::force::simd::Simd;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
-use crate::output::checkpoint::Checkpoint;
+use crate::output::checkpoint::{self, Checkpoint};
 use crate::packing::{self, Packing, Worst};
 use crate::simulation::{Model, Simulation};
 use crate::state::particles::SpeciesConstants;
@@ -33,6 +33,8 @@ pub struct Initial {
     pub particles: Vec<ParticleState>,
     /// Contact memory that this rank holds for now.
     pub memory: ContactMemory,
+    /// Name and unit of each memory column of each pair of materials; empty where there is no memory yet.
+    pub columns: Vec<Vec<[String; 2]>>,
 }
 
 /// What all ranks must know of all particles.
@@ -92,7 +94,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         quasi_static: None,
     };
     programme(config).enter(&mut global);
-    Ok(Initial { global, particles, memory: ContactMemory::new(0) })
+    Ok(Initial { global, particles, memory: ContactMemory::new(0), columns: Vec::new() })
 }
 
 /// The particles of rank 0 on every rank.
@@ -121,7 +123,8 @@ pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initia
             particle.id, particle.species
         )));
     }
-    Ok(Initial { global: checkpoint.global, particles: checkpoint.particles, memory: checkpoint.memory })
+    let Checkpoint { global, particles, memory, columns, .. } = checkpoint;
+    Ok(Initial { global, particles, memory, columns })
 }
 
 /// The grid of ranks for a number of particles, and the ranks that it uses.
@@ -231,12 +234,18 @@ fn artificially_damped(pair: &PairConfig, restitution: f64) -> PairConfig {
 }
 
 fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
-    let width = model.lists.memory_width();
-    if !initial.memory.keys.is_empty() && initial.memory.width != width {
+    let columns = checkpoint::named(&model.columns());
+    if !initial.memory.keys.is_empty() && initial.columns != columns {
+        let pairs = model.config.pairs.iter().map(|pair| pair.properties.names.join(" with "));
+        let mut differing =
+            pairs.zip(initial.columns.iter().zip(&columns)).filter(|(_, (found, needed))| found != needed);
+        let difference = differing.next().map_or_else(
+            || format!("it is of {} pairs of materials instead of {}", initial.columns.len(), columns.len()),
+            |(pair, (found, needed))| format!("its contacts of {pair} {}", difference(found, needed)),
+        );
         return Err(Error::Input(format!(
-            "the checkpoint does not fit this input: it holds {} numbers per contact, the contact laws of the input need \
-             {width}; restart with the contact laws of that run",
-            initial.memory.width
+            "the checkpoint does not fit this input: {difference}; restart with the contact laws and the version of \
+             that run (config.resolved.toml beside the checkpoint)"
         )));
     }
     let reach = 2.0 * model.max_radius + model.outer_skin();
@@ -251,6 +260,22 @@ fn check_fit(model: &Model, initial: &Initial) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// How memory columns differ from those that the laws need.
+fn difference(found: &[[String; 2]], needed: &[[String; 2]]) -> String {
+    let missing_in = |columns: &[[String; 2]], other: &[[String; 2]]| {
+        let missing = columns.iter().filter(|column| !other.contains(column));
+        missing.map(|[name, unit]| format!("{name} ({unit})")).collect::<Vec<String>>().join(", ")
+    };
+    match (missing_in(found, needed), missing_in(needed, found)) {
+        (extra, lacking) if extra.is_empty() && lacking.is_empty() => {
+            "keep the same numbers in another order".to_owned()
+        }
+        (extra, lacking) if extra.is_empty() => format!("lack {lacking}"),
+        (extra, lacking) if lacking.is_empty() => format!("keep {extra}, which the contact laws do not know"),
+        (extra, lacking) => format!("keep {extra} instead of {lacking}"),
+    }
 }
 
 fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[ParticleState]) -> Extremes {
@@ -393,5 +418,5 @@ pub fn onto_first(comm: &Communicator, ranks: usize, initial: Initial) -> Result
         width: initial.memory.width,
         values: bytemuck::pod_collect_to_vec(&joined(value_sends)),
     };
-    Ok(Initial { global: initial.global, particles, memory })
+    Ok(Initial { particles, memory, ..initial })
 }

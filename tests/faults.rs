@@ -54,6 +54,25 @@ fn corrupt_truncated_and_foreign_checkpoints_are_refused() {
 }
 
 #[test]
+fn a_checkpoint_whose_contacts_keep_something_else_is_refused() {
+    let directory = finished("other-laws");
+    let config = data("mixed_flow.toml");
+    for (law, wanted) in [
+        (
+            "{ scheme = \"midpoint\" }",
+            "of soft with soft keep hertzian (m^2) instead of overlap (m), long_term_force (N);",
+        ),
+        ("{ damping = \"tsuji\" }", ""),
+    ] {
+        let changed = format!("pair.0.normal.maxwell_zener={law}");
+        let extra = ["--restart", directory.to_str().expect("UTF-8"), "--set", &changed];
+        let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &scratch("others"), &extra);
+        assert_eq!(output.status.success(), wanted.is_empty(), "{}", text(&output));
+        assert!(text(&output).contains(wanted), "{}", text(&output));
+    }
+}
+
+#[test]
 fn a_damaged_newest_checkpoint_is_passed_over_with_a_warning() {
     let directory = finished("passed-over");
     let newest = directory.join("checkpoint-000000001000.h5");

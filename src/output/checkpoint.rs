@@ -27,6 +27,8 @@ pub struct Checkpoint {
     pub particles: Vec<ParticleState>,
     /// Contacts whose low id lies in this rank's block, sorted by key.
     pub memory: ContactMemory,
+    /// Name and unit of each memory column of each pair of materials.
+    pub columns: Vec<Vec<[String; 2]>>,
     /// The resolved input of the run that wrote it.
     pub config_resolved: String,
     /// Digest of the whole state.
@@ -62,6 +64,7 @@ pub fn write(
     keep: usize,
 ) -> Result<PathBuf> {
     let json = global_json(global)?;
+    let columns = serde_json::to_string(&named(columns)).unwrap_or_default();
     let (first, particles) = redistribute::to_id_blocks(comm, global.particles, particles, global.step)?;
     let memory = redistribute::memory_to_id_blocks(comm, global.particles, &memory, global.step)?;
     let digest = digest(comm, global, &particles, &memory);
@@ -81,7 +84,7 @@ pub fn write(
         layout.attribute("/", name, Value::Text(text.to_owned()));
     }
     layout.constant("/config_resolved", Value::Text(config_resolved.to_owned()));
-    layout.constant("/memory_columns", Value::Text(columns_json(columns)));
+    layout.constant("/memory_columns", Value::Text(columns));
     lay_out_particles(&mut layout, global.particles);
     lay_out_contacts(&mut layout, counts[0] as u64, memory.width as u64);
 
@@ -237,10 +240,11 @@ fn global_json(global: &GlobalState) -> Result<String> {
     }
 }
 
-fn columns_json(columns: &[Vec<Column>]) -> String {
-    let named: Vec<Vec<[&str; 2]>> =
-        columns.iter().map(|pair| pair.iter().map(|column| [column.name.as_str(), column.unit]).collect()).collect();
-    serde_json::to_string(&named).unwrap_or_default()
+/// Name and unit of each memory column of each pair of materials, as a checkpoint holds them.
+#[must_use]
+pub fn named(columns: &[Vec<Column>]) -> Vec<Vec<[String; 2]>> {
+    let name = |column: &Column| [column.name.clone(), column.unit.to_owned()];
+    columns.iter().map(|pair| pair.iter().map(name).collect()).collect()
 }
 
 /// Calls the macro `$do!(field, number type, columns)` for each particle field.
@@ -386,7 +390,9 @@ fn read_block(comm: &Communicator, path: &Path) -> Result<Checkpoint> {
     // Contacts between walls and particles have their low id among the particles: none lies beyond.
     let particles = read_particles(&reader, start, end - start)?;
     let memory = read_contacts(&reader, start, end)?;
-    Ok(Checkpoint { global, particles, memory, config_resolved: reader.text("/config_resolved")?, digest })
+    let columns = serde_json::from_str(&reader.text("/memory_columns")?)
+        .map_err(|error| fault(path, format!("its memory columns cannot be read: {error}")))?;
+    Ok(Checkpoint { global, particles, memory, columns, config_resolved: reader.text("/config_resolved")?, digest })
 }
 
 #[cfg(test)]
