@@ -3,6 +3,16 @@
 
 use super::leap_frog::StepMotion;
 
+/// What a step looks at to learn how far particles have moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Watch {
+    /// How fast particles are.
+    #[default]
+    Speeds,
+    /// How far particles are from their reference positions.
+    Displacements,
+}
+
 /// What a step brings back.
 #[derive(Debug, Default)]
 pub struct StepResult {
@@ -50,7 +60,7 @@ impl StepResult {
     /// particle's own motion added to it in this step \[m\].
     #[must_use]
     pub fn farthest(&self, motion: &StepMotion) -> f64 {
-        if motion.measure {
+        if motion.watch == Watch::Displacements {
             return self.max_displacement_squared.sqrt();
         }
         let [x, y, z] = self.max_velocity_squared;
@@ -66,8 +76,8 @@ pub struct Displacement {
     pub bound: f64,
     /// What particles' own motion added in the last step that was not measured \[m\].
     pub step: f64,
-    /// The next step is to measure.
-    pub measure: bool,
+    /// What the next step is to look at.
+    pub watch: Watch,
 }
 
 impl Displacement {
@@ -76,7 +86,7 @@ impl Displacement {
     /// With u the displacement, s the factor on positions (1 in BC), λ that on the sides and x₀ − u₀ the place that the
     /// reference position has come to with the cell, a step adds its own motion to `s u₀ + (s − λ)(x₀ − u₀)`.
     pub fn follow(&mut self, motion: &StepMotion, farthest: f64) {
-        if motion.measure {
+        if motion.watch == Watch::Displacements {
             self.bound = farthest;
             return;
         }
@@ -113,7 +123,7 @@ mod tests {
             rotation: false,
             ledger: false,
             orientation: false,
-            measure: false,
+            watch: Watch::Speeds,
             simd: Simd::Scalar,
         }
     }
@@ -169,10 +179,10 @@ mod tests {
 
     #[test]
     fn a_measured_step_replaces_the_bound() {
-        let motion = StepMotion { measure: true, ..motion([1.0; 3], SIDES, SIDES) };
+        let motion = StepMotion { watch: Watch::Displacements, ..motion([1.0; 3], SIDES, SIDES) };
         let mut result = StepResult::default();
         result.take_displacement(4e-6, 0);
-        let mut displacement = Displacement { bound: 0.5, step: 1e-3, measure: true };
+        let mut displacement = Displacement { bound: 0.5, step: 1e-3, watch: motion.watch };
         displacement.follow(&motion, result.farthest(&motion));
         assert!((displacement.bound - 2e-3).abs() < 1e-15 && displacement.step == 1e-3);
     }

@@ -3,7 +3,7 @@
 //! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
-use super::displacement::StepResult;
+use super::displacement::{StepResult, Watch};
 use super::gather::Lines;
 use super::rotation::{Body, Rotation, Spins};
 use crate::contact::ends::ChunkEnds;
@@ -49,8 +49,8 @@ pub struct StepMotion {
     pub ledger: bool,
     /// Follow orientations.
     pub orientation: bool,
-    /// Measure displacements since the reference positions; otherwise only speeds are looked at.
-    pub measure: bool,
+    /// What to look at to learn how far particles have moved.
+    pub watch: Watch,
     /// Instructions to use.
     pub simd: Simd,
 }
@@ -222,7 +222,7 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     if !slice.shape.is_empty() {
         turn_all::<W>(slice, range.clone(), loads, motion);
     }
-    match (motion.rotation && slice.shape.is_empty(), motion.measure) {
+    match (motion.rotation && slice.shape.is_empty(), motion.watch == Watch::Displacements) {
         (true, true) => move_all::<L, true, true>(slice, range, loads, motion, result),
         (true, false) => move_all::<L, true, false>(slice, range, loads, motion, result),
         (false, true) => move_all::<L, false, true>(slice, range, loads, motion, result),
@@ -230,8 +230,8 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     }
 }
 
-/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation. `MEASURE`: see
-/// [`StepMotion::measure`].
+/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation. `MEASURE`: looking
+/// at displacements, not at speeds.
 #[inline(always)]
 fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
     slice: &mut Slice,

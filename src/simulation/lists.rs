@@ -6,7 +6,7 @@ use crate::contact::ends::End;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::force::pass::PairPass;
-use crate::integrate::displacement::Displacement;
+use crate::integrate::displacement::{Displacement, Watch};
 use crate::integrate::leap_frog::StepMotion;
 use crate::neighbour::tiles;
 use crate::neighbour::verlet::Region;
@@ -78,7 +78,8 @@ impl Simulation {
         match self.stale(bound) {
             // So close that the next step needs to be measured, unless particles are accelerated to twice their speed.
             Stale::Nothing => {
-                self.budget.displacement.measure = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing)
+                let near = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing);
+                self.budget.displacement.watch = if near { Watch::Displacements } else { Watch::Speeds };
             }
             Stale::ContactList => {
                 self.timers.start(Stage::Neighbours);
@@ -198,7 +199,7 @@ impl Simulation {
     fn rebuild_contacts(&mut self) -> Result<()> {
         let sides = self.global.sides;
         self.budget.reference_sides = sides;
-        self.budget.displacement = Displacement { bound: 0.0, measure: false, ..self.budget.displacement };
+        self.budget.displacement = Displacement { bound: 0.0, watch: Watch::Speeds, ..self.budget.displacement };
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
         let mut largest = [self.contacts.largest_number() as f64, self.contacts.lines as f64];

@@ -454,7 +454,7 @@ impl Simulation {
             rotation: self.model.rotation,
             ledger: extras.ledger,
             orientation: extras.orientation,
-            measure: self.budget.displacement.measure,
+            watch: self.budget.displacement.watch,
             simd: self.model.simd,
         }
     }
