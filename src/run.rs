@@ -121,6 +121,9 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
 }
 
 fn prepare(config: &Config, checkpoint: Option<&Path>, step: u64) -> Result<()> {
+    if let Some(file) = checkpoint {
+        output::check_directory(config, file)?;
+    }
     output::prepare_directory(config, step)?;
     checkpoint.map_or(Ok(()), |file| output::take_over(config, file))
 }

@@ -73,6 +73,23 @@ fn a_checkpoint_whose_contacts_keep_something_else_is_refused() {
 }
 
 #[test]
+fn a_restart_into_the_directory_of_another_run_is_refused() {
+    let (from, other) = (finished("from"), finished("other"));
+    let config = data("mixed_flow.toml");
+    let history = fs::read(other.join("history.csv")).expect("a history");
+    let extra = ["--restart", from.to_str().expect("UTF-8")];
+    let refused = launch(&Run { config: &config, ranks: 2, threads: 1 }, &other, &extra);
+    assert!(!refused.status.success(), "{}", text(&refused));
+    for fragment in ["holds another run", other.to_str().expect("UTF-8"), "--output"] {
+        assert!(text(&refused).contains(fragment), "expected {fragment:?} in: {}", text(&refused));
+    }
+    assert_eq!(fs::read(other.join("history.csv")).expect("a history"), history);
+    assert!(other.join("checkpoint-000000001000.h5").exists() && other.join("status.toml").exists());
+    let own = launch(&Run { config: &config, ranks: 2, threads: 1 }, &from, &extra);
+    assert!(own.status.success(), "{}", text(&own));
+}
+
+#[test]
 fn a_damaged_newest_checkpoint_is_passed_over_with_a_warning() {
     let directory = finished("passed-over");
     let newest = directory.join("checkpoint-000000001000.h5");

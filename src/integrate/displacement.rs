@@ -74,7 +74,7 @@ impl StepResult {
 pub struct Displacement {
     /// No particle moved farther \[m\].
     pub bound: f64,
-    /// What particles' own motion added in the last step that was not measured \[m\].
+    /// What the last step that was not measured added \[m\].
     pub step: f64,
     /// What the next step is to look at.
     pub watch: Watch,
@@ -93,8 +93,9 @@ impl Displacement {
         // Particles are inside the cell or at most a radius behind a wall.
         let place = |k: usize| 2.0 * (motion.previous_sides[k] + self.bound);
         let [x, y, z] = [0, 1, 2].map(|k| (motion.scale[k] - motion.sides[k] / motion.previous_sides[k]) * place(k));
+        let before = self.bound;
         self.bound = largest(motion.scale) * self.bound + (x * x + y * y + z * z).sqrt() + farthest;
-        self.step = farthest;
+        self.step = self.bound - before;
     }
 }
 

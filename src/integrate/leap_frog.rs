@@ -19,7 +19,7 @@ use crate::state::particles::{Particles, RECORD, Record, trimmed};
 use crate::state::shape::Shape;
 use std::ops::Range;
 
-/// How many particles ahead velocities and reference positions are asked for.
+/// How many particles ahead velocities, spins and, where they are looked at, reference positions are asked for.
 const AHEAD: usize = 128;
 
 /// What is the same for all particles in one step.

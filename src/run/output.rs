@@ -43,6 +43,29 @@ pub fn prepare_directory(config: &Config, step: u64) -> Result<()> {
     fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, error))
 }
 
+/// Rank 0: a restart goes on in the directory of its checkpoint or begins one in which no run has written.
+///
+/// # Errors
+/// The directory holds another run, whose files would be mixed with those of this one.
+pub fn check_directory(config: &Config, checkpoint: &Path) -> Result<()> {
+    let to = &config.output.directory;
+    let from = checkpoint.parent().filter(|from| !from.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let same = match (fs::canonicalize(from), fs::canonicalize(to)) {
+        (Ok(from), Ok(to)) => from == to,
+        _ => false,
+    };
+    if same || !to.join("history.csv").exists() {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "output.directory {} holds another run than the checkpoint {}: go on where that one is with --output {}, or give \
+         the name of a new directory",
+        to.display(),
+        checkpoint.display(),
+        from.display()
+    )))
+}
+
 /// Rank 0: a restart that writes into another directory first takes over the history and the snapshots
 /// that lie beside the checkpoint, so that the new directory tells the whole run.
 ///
@@ -186,9 +209,9 @@ impl RunOutput {
             log.finish();
             let state = if requeue { "requeue" } else { "stopped" };
             say!(
-                "stopped by a signal at step {}; go on with --restart {}",
+                "stopped by a signal at step {}; go on with --restart {directory} --output {directory}",
                 simulation.global().step,
-                self.config.output.directory.display()
+                directory = self.config.output.directory.display()
             );
             written = self.status(state, &format!("checkpoint = {:?}\n", checkpoint.display().to_string()));
         }

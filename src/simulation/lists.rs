@@ -29,7 +29,7 @@ pub struct ListBudget {
     pub reference_sides: [f64; 3],
     /// Cell sides when the Verlet list was made \[m\].
     verlet_sides: [f64; 3],
-    /// Sum over earlier contact lists of the largest displacement during each \[m\].
+    /// Sum over earlier contact lists of the bound on displacements during each \[m\].
     displaced: f64,
     /// Displacement since the contact list was made.
     pub displacement: Displacement,
@@ -113,12 +113,13 @@ impl Simulation {
         let (outer_low, _) = self.stretch(self.budget.verlet_sides);
         let (inner_low, _) = self.stretch(self.budget.reference_sides);
         let outer_room = room(outer_low, self.model.outer_skin()) - self.model.inner_skin();
-        if 2.0 * self.displaced(displacement) >= outer_room {
-            Stale::VerletList
-        } else if 2.0 * displacement >= room(inner_low, self.model.inner_skin()) {
-            Stale::ContactList
-        } else {
-            Stale::Nothing
+        // Written so that with NaN everything is stale.
+        let outer_holds = 2.0 * self.displaced(displacement) < outer_room;
+        let inner_holds = 2.0 * displacement < room(inner_low, self.model.inner_skin());
+        match (outer_holds, inner_holds) {
+            (true, true) => Stale::Nothing,
+            (true, false) => Stale::ContactList,
+            (false, _) => Stale::VerletList,
         }
     }
 
