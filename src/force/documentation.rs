@@ -126,7 +126,7 @@ mod tests {
                 assert!(table.contains(&format!("`{}.{}`", law.name, spec.name)), "{table}");
             }
         }
-        assert!(table.contains("overlap [m], branch_1_force [N]"), "{table}");
+        assert!(table.contains("hertzian [m^2], branch_1_force [N]"), "{table}");
         assert!(table.contains("tangential_force_x [N]"), "{table}");
     }
 }
