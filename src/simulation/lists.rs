@@ -74,13 +74,9 @@ impl Simulation {
     /// [`StepResult::farthest`](crate::integrate::displacement::StepResult::farthest) of all ranks.
     pub(super) fn refresh_lists(&mut self, motion: &StepMotion, farthest: f64) -> Result<()> {
         self.budget.displacement.follow(motion, farthest);
-        let Displacement { bound, step, .. } = self.budget.displacement;
+        let bound = self.budget.displacement.bound;
         match self.stale(bound) {
-            // So close that the next step needs to be measured, unless particles are accelerated to twice their speed.
-            Stale::Nothing => {
-                let near = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing);
-                self.budget.displacement.watch = if near { Watch::Displacements } else { Watch::Speeds };
-            }
+            Stale::Nothing => {}
             Stale::ContactList => {
                 self.timers.start(Stage::Neighbours);
                 self.update_ghosts();
@@ -98,6 +94,10 @@ impl Simulation {
                 self.timers.stop();
             }
         }
+        // So close that the next step needs to be measured, unless particles are accelerated to twice their speed.
+        let Displacement { bound, step, .. } = self.budget.displacement;
+        let near = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing);
+        self.budget.displacement.watch = if near { Watch::Displacements } else { Watch::Speeds };
         Ok(())
     }
 
@@ -200,7 +200,7 @@ impl Simulation {
     fn rebuild_contacts(&mut self) -> Result<()> {
         let sides = self.global.sides;
         self.budget.reference_sides = sides;
-        self.budget.displacement = Displacement { bound: 0.0, watch: Watch::Speeds, ..self.budget.displacement };
+        self.budget.displacement = Displacement { bound: 0.0, ..self.budget.displacement };
         let crossed = &self.reference.crossed;
         self.model.lists.refresh(&mut self.contacts, &self.particles, sides, &mut self.candidates, crossed);
         let mut largest = [self.contacts.largest_number() as f64, self.contacts.lines as f64];
