@@ -200,9 +200,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         stride: 0,
     };
     let turns = passes.iter().any(|pass| pass.width() > 4) || extremes.max_spin > 0.0 || extremes.ellipsoids;
-    let mut cautions: Vec<String> =
-        config.pairs.iter().filter_map(|pair| cautions::of_pair(pair, extremes.sizes)).collect();
-    cautions.dedup();
+    let cautions = cautions::of_run(config, extremes.sizes);
     let model = Model {
         config: Arc::clone(config),
         species,

@@ -4,6 +4,7 @@ use super::alternatives::Chosen;
 use super::schema::{Default, Key, Kind, Range, Table};
 use super::section::Section;
 use super::{Boundary, CellConfig, Material, PairConfig, Species};
+use crate::force::law::Velocities;
 use crate::force::registry::{self, LawChoice, LawEntry, PairProperties, ParameterKind, ParameterValue, Role};
 use crate::units::Dimension;
 use std::sync::LazyLock;
@@ -204,6 +205,7 @@ fn make_pair(
         rolling_friction: constants[2],
         twisting_friction: constants[3],
         surface_energy: constants[4],
+        velocities: Velocities::default(),
     };
     let chosen = [("normal", Some(&normal)), ("tangential", tangential.as_ref()), ("rolling", rolling.as_ref())];
     for (role, choice) in chosen {

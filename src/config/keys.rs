@@ -404,13 +404,7 @@ pub static TIME_STEP: Table = Table {
 static AUTOMATIC: Table = Table {
     meaning: "safety · √(smallest mass / largest contact stiffness).",
     keys: &[
-        key(
-            "safety",
-            number(Dimension::NONE, Range::FRACTION),
-            Default::Number(0.17),
-            "Factor β. Where laws have no dashpot at all, sticking contacts can gain energy at 0.17 (the ledger shows \
-             it) and did not at 0.085.",
-        ),
+        key("safety", number(Dimension::NONE, Range::FRACTION), Default::Number(0.17), "Factor β."),
         key(
             "reference_overlap",
             number(Dimension::NONE, Range::between(0.0, 1.0)),

@@ -26,6 +26,7 @@ pub use reference::{example, reference_markdown};
 pub use routine::{Damping, QuasiStaticConfig, Routine};
 pub use shape::ShapeConfig;
 
+use crate::force::law::Velocities;
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;
 
@@ -44,6 +45,8 @@ pub struct Config {
     pub pairs: Vec<PairConfig>,
     /// How the initial positions are made.
     pub packing: PackingConfig,
+    /// The velocities that the laws of all pairs are given.
+    pub velocities: Velocities,
     /// What becomes of that packing before the run starts.
     pub replication: Replication,
     /// Uniform body acceleration \[m/s²\].
@@ -229,6 +232,14 @@ pub struct PairConfig {
     pub tangential: Option<LawChoice>,
     /// Rolling and twisting resistance; `None`: none.
     pub rolling: Option<LawChoice>,
+}
+
+impl PairConfig {
+    /// The normal and, with its share, the tangential dashpot act: both come from the restitution coefficient.
+    #[must_use]
+    pub fn damps(&self) -> bool {
+        self.normal.damps() && self.properties.restitution < 1.0
+    }
 }
 
 /// How the initial positions are made.

@@ -1,8 +1,10 @@
 //! What a user should know of a law beside these particles: the particles are seen only once they are made, so
 //! these are warnings of the run and not of the input.
 
+use super::law::Velocities;
+use super::registry::LawChoice;
 use super::{becker_kamlah, thornton_ning};
-use crate::config::PairConfig;
+use crate::config::{Config, PairConfig, Routine};
 
 /// Sizes of all particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,9 +15,39 @@ pub struct Sizes {
     pub aspect_ratio: f64,
 }
 
-/// Warnings on one pair of materials.
+/// All warnings, none twice.
 #[must_use]
-pub fn of_pair(pair: &PairConfig, sizes: Sizes) -> Option<String> {
+pub fn of_run(config: &Config, sizes: Sizes) -> Vec<String> {
+    let own = config.pairs.iter().filter_map(|pair| of_pair(pair, sizes));
+    let mut cautions: Vec<String> = own.chain(of_dashpots(config)).collect();
+    cautions.dedup();
+    cautions
+}
+
+/// Springs of a pair without dashpots that are given extrapolated velocities for the sake of others.
+fn of_dashpots(config: &Config) -> Option<String> {
+    let moves = config.stages.iter().any(|stage| stage.routine == Routine::Dynamic);
+    if config.velocities == Velocities::HalfStep || !moves {
+        return None;
+    }
+    let undamped = |pair: &&PairConfig| {
+        let rubs = pair.properties.friction > 0.0 && pair.tangential.is_some();
+        rubs && !(pair.damps() && pair.tangential.as_ref().is_some_and(LawChoice::damps))
+    };
+    let names = |pair: &PairConfig| pair.properties.names.clone().map(|name| format!("\"{name}\"")).join(" with ");
+    let pairs: Vec<String> = config.pairs.iter().filter(undamped).map(names).collect();
+    (!pairs.is_empty()).then(|| {
+        format!(
+            "{} rub without a tangential dashpot in a run that has other dashpots or quasi-static stages: where they stick they \
+             gain energy at third order in the time step (energy_ledger shows it); give them a restitution below 1 and \
+             damping, or take the dashpots from all",
+            pairs.join(", ")
+        )
+    })
+}
+
+/// Warnings on one pair of materials.
+fn of_pair(pair: &PairConfig, sizes: Sizes) -> Option<String> {
     let name = pair.normal.law.name;
     if name == becker_kamlah::ENTRY.name {
         becker_kamlah::caution(sizes.aspect_ratio)

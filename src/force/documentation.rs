@@ -1,7 +1,7 @@
 //! The table of laws for the documentation, written from the registry itself so that it cannot go stale.
 
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
-use super::law::{Column, NormalLaw, RollingLaw, TangentialLaw};
+use super::law::{Column, NormalLaw, RollingLaw, TangentialLaw, Velocities};
 use super::registry::{
     LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role, build_normal, build_rolling,
     build_tangential, laws,
@@ -82,6 +82,7 @@ fn example_pair(law: &'static LawEntry) -> PairConfig {
             rolling_friction: 0.1,
             twisting_friction: 0.1,
             surface_energy: 0.1,
+            velocities: Velocities::default(),
         },
         normal: law.with_defaults(),
         tangential: None,

@@ -2,11 +2,11 @@
 
 use super::composition::TangentialVisitor;
 use super::lane::{Lane, Vector, add, dot, scale, sub};
-use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorResponse};
+use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorResponse, Velocities};
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Slider, Turning, coulomb_limit, stiffness_loss};
+use super::slider::{Slider, Turning, coulomb_limit, slip_loss, stiffness_loss};
 use crate::config::PairConfig;
 
 /// Registry entry.
@@ -40,9 +40,11 @@ const DAMPING: ParameterSpec = ParameterSpec {
 /// spring is a set in parallel, one spring per Maxwell branch with the branch's τ_k and the long-term one:
 /// `F_k ← F_k e^{−x} + f · 8 G_k a Δδ_t (1−e^{−x})/x`, x = Δt/τ_k.
 ///
-/// - Memory: the spring vectors, each *half an increment ahead* of the touch: the force at time t is
-///   the stored one plus half of this step's increment (trapezoidal rule), so that a sticking contact
-///   neither gains nor loses energy at first order in Δt; and the contact radius of the last step.
+/// - Memory: the spring vectors and the contact radius of the last step. In runs with dashpots, whose velocities are those
+///   of the full step, a spring vector is *half an increment ahead* of the touch: the force at time t is the stored one plus
+///   half of this step's increment (trapezoidal rule). A sticking contact then neither gains nor loses energy at first order
+///   in Δt; at third order it gains, the share `(ωΔt)³/4` of its energy per radian, which dashpots outweigh. In runs without dashpots
+///   velocities are those that led to the touch, increments true displacements, and nothing is ahead: no gain.
 /// - The stored vectors turn with the contact ([`Turning`]); where a decreases they shrink with it, so
 ///   that unloading creates no energy.
 /// - Slider: the spring force is cut to μ F_n, F_n after clipping (all springs by the same share), and so
@@ -53,24 +55,28 @@ const DAMPING: ParameterSpec = ParameterSpec {
 /// Energies: springs `½ F_k²/k_k`; friction is slip times the carried force, and what the springs lose as a
 /// changes (micro-slip); the dashpot's is never negative (the cut is a projection on a ball).
 ///
+/// `AHEAD`: springs are half an increment ahead, as velocities are those of the full step ([`Velocities`]).
+///
 /// # Source
 /// W (3.4), (3.5); (3.9) with the erratum on G_eff.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mindlin<const SPRINGS: usize> {
+pub struct Mindlin<const SPRINGS: usize, const AHEAD: bool> {
     /// f · 8 G_k \[Pa\].
     modulus: [f64; SPRINGS],
     rate: [f64; SPRINGS],
     decay: [f64; SPRINGS],
     weight: [f64; SPRINGS],
-    /// ½ Δt f · 8 G_k (1−e^{−x})/x \[Pa s\]: half a step's increment per contact radius and slip velocity.
+    /// f · 8 G_k (1−e^{−x})/x times [`Self::advance`] \[Pa s\]: what a spring advances by, per contact radius and slip velocity.
     increment: [f64; SPRINGS],
     friction: f64,
     /// c_t/c_n, 0 without dashpot.
     dashpot_ratio: f64,
     time_step: f64,
+    /// The part of Δt whose increment comes before the evaluation \[s\].
+    advance: f64,
 }
 
-impl<const SPRINGS: usize> Mindlin<SPRINGS> {
+impl<const SPRINGS: usize, const AHEAD: bool> Mindlin<SPRINGS, AHEAD> {
     /// From the law's parameters, the shear springs that go with the normal law and the pair's Coulomb
     /// friction coefficient.
     #[must_use]
@@ -86,16 +92,25 @@ impl<const SPRINGS: usize> Mindlin<SPRINGS> {
             friction,
             dashpot_ratio: if damping { (4.0 * factor * shear.shear_to_young).sqrt() } else { 0.0 },
             time_step: 0.0,
+            advance: 0.0,
         }
     }
 }
 
-/// Energy that a branch dissipates in half a step: what it would hold after an elastic half increment from
+/// Energy that a branch dissipates as it advances by `slip`: what it would hold after an elastic increment from
 /// `before`, less what it holds `after`; 0 for a spring that does not relax.
 #[inline(always)]
-fn relaxation_loss<L: Lane>(before: Vector<L>, half_slip: Vector<L>, after: Vector<L>, stiffness: L) -> L {
-    let elastic = add(before, scale(half_slip, stiffness));
+fn relaxation_loss<L: Lane>(before: Vector<L>, slip: Vector<L>, after: Vector<L>, stiffness: L) -> L {
+    let elastic = add(before, scale(slip, stiffness));
     L::splat(0.5) * (dot(elastic, elastic) - dot(after, after)) / stiffness
+}
+
+/// Energy that a branch dissipates in a step from one force to another: the work of their mean along `slip`, and what the
+/// branch held before, less what it holds after.
+#[inline(always)]
+fn step_loss<L: Lane>(before: Vector<L>, after: Vector<L>, slip: Vector<L>, stiffness: L) -> L {
+    let held = dot(before, before) - dot(after, after);
+    L::splat(0.5) * (dot(add(before, after), slip) + held / stiffness)
 }
 
 /// Hands the law of a pair to the visitor; `choice` is the pair's tangential choice.
@@ -105,10 +120,14 @@ pub fn build<V: TangentialVisitor, const SPRINGS: usize>(
     shear: &ShearSprings<SPRINGS>,
     visitor: V,
 ) -> V::Output {
-    visitor.visit(Mindlin::new(choice, shear, pair.properties.friction))
+    let friction = pair.properties.friction;
+    match pair.properties.velocities {
+        Velocities::FullStep => visitor.visit(Mindlin::<SPRINGS, true>::new(choice, shear, friction)),
+        Velocities::HalfStep => visitor.visit(Mindlin::<SPRINGS, false>::new(choice, shear, friction)),
+    }
 }
 
-impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
+impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS, AHEAD> {
     const MEMORY: usize = 3 * SPRINGS + 1;
 
     fn columns(&self) -> Vec<Column> {
@@ -125,11 +144,12 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
 
     fn prepare(&mut self, time_step: f64) {
         self.time_step = time_step;
+        self.advance = time_step * if AHEAD { 0.5 } else { 1.0 };
         for k in 0..SPRINGS {
             let x = time_step * self.rate[k];
             self.decay[k] = libm::exp(-x);
             self.weight[k] = mean_decay(x);
-            self.increment[k] = 0.5 * time_step * self.modulus[k] * self.weight[k];
+            self.increment[k] = self.advance * self.modulus[k] * self.weight[k];
         }
     }
 
@@ -176,7 +196,10 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
             carried[k] = scale(turning.turn(stored, early[2 * k]), early[2 * k + 1]);
             advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * radius);
-            trial[k] = add(carried[k], advance[k]);
+            // What is not ahead relaxes now; the last spring is the long-term one, whose decay is 1.
+            let relaxes = !AHEAD && k + 1 < SPRINGS;
+            let before = if relaxes { scale(carried[k], L::splat(self.decay[k])) } else { carried[k] };
+            trial[k] = add(before, advance[k]);
         }
         let load = trial[1..].iter().fold(trial[0], |sum, spring| add(sum, *spring));
         let damping = scale(touch.slip_velocity, L::splat(self.dashpot_ratio) * normal.dashpot);
@@ -186,22 +209,29 @@ impl<const SPRINGS: usize> TangentialLaw for Mindlin<SPRINGS> {
         let (value, share) = (slider.carry(sum), slider.share);
 
         let mut energies = Energies::zero();
-        let half_slip = scale(touch.slip_velocity, half * L::splat(self.time_step));
+        let slip = scale(touch.slip_velocity, L::splat(self.advance));
         let slipped = share * (one - share);
         for k in 0..SPRINGS {
             let force = slider.carry(trial[k]);
-            // The last spring is the long-term one, whose decay is 1.
-            let relaxed = if k + 1 == SPRINGS { force } else { scale(force, L::splat(self.decay[k])) };
-            let ahead = add(relaxed, advance[k]);
+            let relaxed = if AHEAD && k + 1 < SPRINGS { scale(force, L::splat(self.decay[k])) } else { force };
+            let ahead = if AHEAD { add(relaxed, advance[k]) } else { relaxed };
 
             let stiffness = L::splat(self.modulus[k]) * radius;
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
             let last_stiffness = L::splat(self.modulus[k]) * last;
             let shrunk = stiffness_loss(dot(stored, stored), last_stiffness, dot(carried[k], carried[k]), stiffness);
-            energies.friction = energies.friction + shrunk + slipped * dot(trial[k], trial[k]) / stiffness;
-            energies.viscous = energies.viscous
-                + relaxation_loss(carried[k], half_slip, trial[k], stiffness)
-                + relaxation_loss(force, half_slip, ahead, stiffness);
+            let (slid, relaxed) = if AHEAD {
+                let relaxed = relaxation_loss(carried[k], slip, trial[k], stiffness)
+                    + relaxation_loss(force, slip, ahead, stiffness);
+                (slipped * dot(trial[k], trial[k]) / stiffness, relaxed)
+            } else {
+                let relaxed = step_loss(carried[k], trial[k], slip, stiffness);
+                // The force before had not shrunk with the contact yet.
+                let shrunk = half * dot(carried[k], slip) * (one.max(last / radius) - one);
+                (slip_loss(trial[k], force, slip, stiffness) + shrunk, if self.rate[k] == 0.0 { zero } else { relaxed })
+            };
+            energies.friction = energies.friction + shrunk + slid;
+            energies.viscous = energies.viscous + relaxed;
             let held = half * dot(force, force) / stiffness;
             if self.rate[k] == 0.0 {
                 energies.elastic = energies.elastic + held;

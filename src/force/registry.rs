@@ -2,6 +2,7 @@
 
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
 pub use super::documentation::table_markdown;
+use super::law::Velocities;
 use super::shear::ShearSprings;
 use crate::config::{MaxwellBranch, PairConfig};
 
@@ -174,6 +175,18 @@ impl LawChoice {
             _ => {}
         }
     }
+    /// Some force of the law may go with a velocity: it has no parameter `damping` or `damping_ratio`, or that is not `none`,
+    /// false or 0.
+    #[must_use]
+    pub fn damps(&self) -> bool {
+        let parameters = self.law.parameters.iter().zip(&self.values);
+        let mut dashpots = parameters.filter(|(parameter, _)| ["damping", "damping_ratio"].contains(&parameter.name));
+        dashpots.next().is_none_or(|(parameter, value)| match (parameter.kind, value) {
+            (ParameterKind::Choice(words), ParameterValue::Choice(chosen)) => words[*chosen] != "none",
+            (_, value) => ![ParameterValue::Flag(false), ParameterValue::Number(0.0)].contains(value),
+        })
+    }
+
     /// Value of a number parameter; panics on a name that the law does not declare (our own bug).
     #[must_use]
     pub fn number(&self, name: &str) -> f64 {
@@ -234,6 +247,8 @@ pub struct PairProperties {
     pub twisting_friction: f64,
     /// Work of adhesion of the pair \[J/m²\].
     pub surface_energy: f64,
+    /// The velocities that laws are given, of this pair as of all others.
+    pub velocities: Velocities,
 }
 
 impl PairProperties {

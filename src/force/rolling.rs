@@ -2,9 +2,9 @@
 
 use super::composition::RollingVisitor;
 use super::lane::{Lane, add, dot, scale, sub};
-use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
+use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse, Velocities};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
-use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, stiffness_loss};
+use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, slip_loss, stiffness_loss};
 use crate::config::PairConfig;
 
 /// Registry entry.
@@ -38,7 +38,7 @@ const DAMPING_RATIO: ParameterSpec = ParameterSpec {
 /// a \[m\] contact radius, G_eff \[Pa\] (long-term with Maxwell branches), M \[N m\]. The moment on i is +M,
 /// on j −M: i is dragged along by j's relative rotation.
 ///
-/// As in the tangential law, the stored moments are half an increment ahead of the touch, turn with the
+/// As in the tangential law, in runs with dashpots the stored moments are half an increment ahead of the touch; they turn with the
 /// contact and shrink with the stiffness when a decreases. The dashpots have `c = 2 ζ √(I K)` with
 /// `I = 2/5 m_eff R_eff²` (a sphere against a wall; between equal spheres the damping ratio is ζ/2) and act
 /// within the same limits. Memory: rolling moment vector, twisting moment, contact radius of the last step.
@@ -52,6 +52,7 @@ pub struct SpringSlider {
     rolling_friction: f64,
     twisting: TwistingLimit,
     damping_ratio: f64,
+    velocities: Velocities,
     time_step: f64,
 }
 
@@ -76,6 +77,7 @@ impl SpringSlider {
                 _ => TwistingLimit::EffectiveRadius(properties.twisting_friction),
             },
             damping_ratio: choice.number(DAMPING_RATIO.name),
+            velocities: properties.velocities,
             time_step: 0.0,
         }
     }
@@ -123,6 +125,8 @@ impl RollingLaw for SpringSlider {
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
         let (half, one) = (L::splat(0.5), L::splat(1.0));
         let step = L::splat(self.time_step);
+        let share = self.velocities.share_before();
+        let (before, ahead) = (L::splat(share * self.time_step), L::splat((1.0 - share) * self.time_step));
         let (a, last) = (normal.contact_radius, memory[4]);
         let square = touch.effective_radius * touch.effective_radius;
         let inertia = L::splat(0.4) * touch.effective_mass * square;
@@ -135,17 +139,21 @@ impl RollingLaw for SpringSlider {
         let stiffness = modulus * a * square;
         let stored = [memory[0], memory[1], memory[2]];
         let carried = Turning::new(touch, self.time_step).apply(stored, a, last);
-        let advance = scale(roll_rate, half * step * stiffness);
-        let trial = add(carried, advance);
+        let trial = add(carried, scale(roll_rate, before * stiffness));
         let limit = coulomb_limit(self.rolling_friction, normal.force) * touch.effective_radius;
         let slider = Slider::new(trial, limit);
         let (spring, share) = (slider.carry(trial), slider.share);
         let damped = add(spring, scale(roll_rate, self.dashpot(inertia, stiffness)));
         let rolling = Slider::new(damped, limit).carry(damped);
-        [memory[0], memory[1], memory[2]] = add(spring, advance);
+        [memory[0], memory[1], memory[2]] = add(spring, scale(roll_rate, ahead * stiffness));
         energies.elastic = half * dot(spring, spring) / stiffness;
-        energies.friction = share * (one - share) * dot(trial, trial) / stiffness
-            + stiffness_loss(dot(stored, stored), modulus * last * square, dot(carried, carried), stiffness);
+        let slid = if self.velocities == Velocities::FullStep {
+            share * (one - share) * dot(trial, trial) / stiffness
+        } else {
+            slip_loss(trial, spring, scale(roll_rate, step), stiffness)
+        };
+        energies.friction =
+            slid + stiffness_loss(dot(stored, stored), modulus * last * square, dot(carried, carried), stiffness);
         energies.damping = dot(sub(rolling, spring), roll_rate) * step;
 
         // Twisting, a scalar along n.
@@ -153,19 +161,23 @@ impl RollingLaw for SpringSlider {
         let last_stiffness = half * modulus * last * last * last;
         let stored = memory[3];
         let carried = stored * kept_share(stiffness, last_stiffness);
-        let advance = twist_rate * half * step * stiffness;
-        let trial = carried + advance;
+        let trial = carried + twist_rate * before * stiffness;
         let limit = self.twisting_limit(touch, normal);
         let share = carried_share((trial * trial).sqrt(), limit);
         let spring = trial * share;
         let damped = spring + twist_rate * self.dashpot(inertia, stiffness);
         let twisting = damped * carried_share((damped * damped).sqrt(), limit);
-        memory[3] = spring + advance;
+        memory[3] = spring + twist_rate * ahead * stiffness;
         memory[4] = a;
         energies.elastic = energies.elastic + half * spring * spring / stiffness;
-        energies.friction = energies.friction
-            + share * (one - share) * trial * trial / stiffness
-            + stiffness_loss(stored * stored, last_stiffness, carried * carried, stiffness);
+        let slid = if self.velocities == Velocities::FullStep {
+            share * (one - share) * trial * trial / stiffness
+        } else {
+            let (zero, slip) = (L::splat(0.0), twist_rate * step);
+            slip_loss([trial, zero, zero], [spring, zero, zero], [slip, zero, zero], stiffness)
+        };
+        energies.friction =
+            energies.friction + slid + stiffness_loss(stored * stored, last_stiffness, carried * carried, stiffness);
         energies.damping = energies.damping + (twisting - spring) * twist_rate * step;
 
         VectorResponse { value: add(rolling, scale(touch.normal, twisting)), energies }

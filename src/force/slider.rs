@@ -143,3 +143,13 @@ pub fn stiffness_loss<L: Lane>(before: L, last: L, after: L, stiffness: L) -> L 
     let loss = L::splat(0.5) * (before / last - after / stiffness);
     loss.only(last.greater(zero))
 }
+
+/// Energy that a slider dissipates in a step along `slip` that would bring a spring to the force `trial`, and that it holds at
+/// `force`: with the spring's own it makes up the work of the mean of the forces before and after. May be negative where a
+/// load is reversed; sums over steps converge at second order in Δt.
+#[inline(always)]
+#[must_use]
+pub fn slip_loss<L: Lane>(trial: Vector<L>, force: Vector<L>, slip: Vector<L>, stiffness: L) -> L {
+    let excess = sub(trial, force);
+    L::splat(0.5) * (dot(excess, add(trial, force)) / stiffness - dot(excess, slip))
+}

@@ -1,6 +1,6 @@
 //! Helpers of the laws' tests: pairs, touches and a one-contact integrator.
 
-use super::law::{Energies, NormalLaw, Touch};
+use super::law::{Energies, NormalLaw, Touch, Velocities};
 use super::registry::{LawChoice, PairProperties, ParameterKind, ParameterValue, Role, find};
 use crate::config::{MaxwellBranch, PairConfig};
 
@@ -23,6 +23,7 @@ pub fn properties(young_modulus: f64, poisson_ratio: f64, maxwell: Vec<MaxwellBr
         rolling_friction: 0.05,
         twisting_friction: 0.02,
         surface_energy: 1e-4,
+        velocities: Velocities::default(),
     }
 }
 

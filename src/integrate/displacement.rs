@@ -108,6 +108,7 @@ fn largest(values: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::law::Velocities;
     use crate::force::simd::Simd;
 
     const SIDES: [f64; 3] = [1.0, 2.0, 0.5];
@@ -126,6 +127,7 @@ mod tests {
             rotation: false,
             ledger: false,
             orientation: false,
+            velocities: Velocities::FullStep,
             watch: Watch::Speeds,
             simd: Simd::Scalar,
         }

@@ -1,6 +1,6 @@
 //! Leap-frog motion of spheres, W (2.1)–(2.4), in a periodic cell that deforms.
 //!
-//! Velocities are kept at half steps, positions at full steps. With a changing time step (2.3) takes
+//! Velocities are kept at half steps and, extrapolated, at full steps; positions at full steps. With a changing time step (2.3) takes
 //! half the old one and (2.4) half the new one.
 
 use super::displacement::{StepResult, Watch};
@@ -13,6 +13,7 @@ use crate::force::lane::portable::Portable;
 use crate::force::lane::{Lane, SHAPE, align_stack, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
+use crate::force::law::Velocities;
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, RECORD, Record, trimmed};
@@ -49,6 +50,8 @@ pub struct StepMotion {
     pub ledger: bool,
     /// Follow orientations.
     pub orientation: bool,
+    /// What velocities records have.
+    pub velocities: Velocities,
     /// What to look at to learn how far particles have moved.
     pub watch: Watch,
     /// Instructions to use.
@@ -216,24 +219,42 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     if motion.ledger {
         for (place, (index, load)) in range.clone().zip(&*loads).enumerate() {
             lines.add_ledger(chunk.of(place), &mut slice.ledger[index]);
-            add_external_work(&mut slice.ledger[index], &slice.record[index], load, motion);
+            let velocity = match motion.velocities {
+                Velocities::FullStep => slice.record[index].velocity,
+                Velocities::HalfStep => trimmed(slice.velocity[index]),
+            };
+            add_external_work(&mut slice.ledger[index], &slice.record[index], velocity, load, motion);
         }
     }
     if !slice.shape.is_empty() {
         turn_all::<W>(slice, range.clone(), loads, motion);
     }
-    match (motion.rotation && slice.shape.is_empty(), motion.watch == Watch::Displacements) {
-        (true, true) => move_all::<L, true, true>(slice, range, loads, motion, result),
-        (true, false) => move_all::<L, true, false>(slice, range, loads, motion, result),
-        (false, true) => move_all::<L, false, true>(slice, range, loads, motion, result),
-        (false, false) => move_all::<L, false, false>(slice, range, loads, motion, result),
+    match motion.velocities {
+        Velocities::FullStep => move_seen::<L, false>(slice, range, loads, motion, result),
+        Velocities::HalfStep => move_seen::<L, true>(slice, range, loads, motion, result),
     }
 }
 
-/// The motion of particles under these forces and torques; `TURN`: as spheres also their rotation. `MEASURE`: looking
-/// at displacements, not at speeds.
+/// The motion of particles under these forces and torques; `HALF`: records have the velocities of the half step.
 #[inline(always)]
-fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
+fn move_seen<L: Lane, const HALF: bool>(
+    slice: &mut Slice,
+    range: Range<usize>,
+    loads: &[[f64; 8]],
+    motion: &StepMotion,
+    result: &mut StepResult,
+) {
+    match (motion.rotation && slice.shape.is_empty(), motion.watch == Watch::Displacements) {
+        (true, true) => move_all::<L, HALF, true, true>(slice, range, loads, motion, result),
+        (true, false) => move_all::<L, HALF, true, false>(slice, range, loads, motion, result),
+        (false, true) => move_all::<L, HALF, false, true>(slice, range, loads, motion, result),
+        (false, false) => move_all::<L, HALF, false, false>(slice, range, loads, motion, result),
+    }
+}
+
+/// As [`move_seen`]. `TURN`: as spheres also their rotation. `MEASURE`: looking at displacements, not at speeds.
+#[inline(always)]
+fn move_all<L: Lane, const HALF: bool, const TURN: bool, const MEASURE: bool>(
     slice: &mut Slice,
     range: Range<usize>,
     loads: &[[f64; 8]],
@@ -268,7 +289,7 @@ fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
         if falls {
             acceleration = acceleration + gravity.only(inverse_mass.greater(zero));
         }
-        let mut half_velocity = L::load(velocity) + kick * acceleration;
+        let mut half_velocity = (if HALF { L::load(&numbers[4..8]) } else { L::load(velocity) }) + kick * acceleration;
         let mut position = scale * L::load(&numbers[..4]) + drift * half_velocity;
         if !MEASURE {
             let squares = half_velocity * half_velocity;
@@ -277,18 +298,26 @@ fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
         // The fourth numbers come from splats: stores of some lanes only are slow.
         if TURN {
             let angular = torque * L::splat(spin[3]);
-            let half_spin = L::load(spin) + kick * angular;
-            half_spin.store(spin);
-            L::select(vector, half_spin + half * angular, inverse_mass).store(&mut numbers[8..]);
+            let half_spin = (if HALF { L::load(&numbers[8..]) } else { L::load(spin) }) + kick * angular;
+            let full_spin = half_spin + half * angular;
+            if HALF {
+                half_spin.store(&mut numbers[8..]);
+                L::select(vector, full_spin, L::splat(spin[3])).store(spin);
+            } else {
+                half_spin.store(spin);
+                L::select(vector, full_spin, inverse_mass).store(&mut numbers[8..]);
+            }
             if motion.orientation {
-                slice.orientation[index] = turned(slice.orientation[index], trimmed(*spin), new);
+                let half_spin = if HALF { [numbers[8], numbers[9], numbers[10]] } else { trimmed(*spin) };
+                slice.orientation[index] = turned(slice.orientation[index], half_spin, new);
             }
         }
         position.store(&mut numbers[..4]);
         if L::any(zero.greater(position) | position.at_least(sides)) {
-            half_velocity.store(velocity);
+            let mut carried = [0.0; 4];
+            half_velocity.store(&mut carried);
             let particle = (slice.start + index) as u32;
-            let crossed = wrap(record, velocity, reference, motion);
+            let crossed = wrap(record, &mut carried, reference, motion);
             if crossed.lost {
                 result.lost = Some(particle);
             }
@@ -299,12 +328,18 @@ fn move_all<L: Lane, const TURN: bool, const MEASURE: bool>(
                 cross(&mut slice.crossed[index], crossed.wraps);
                 result.wrapped.push((particle, crossed.wraps));
             }
-            half_velocity = L::load(velocity);
+            half_velocity = L::load(&carried);
             position = L::load(&bytemuck::cast_ref::<_, [f64; RECORD]>(record)[..4]);
         }
-        half_velocity.store(velocity);
         let numbers: &mut [f64; RECORD] = bytemuck::cast_mut(record);
-        L::select(vector, half_velocity + half * acceleration, L::splat(numbers[3])).store(&mut numbers[4..8]);
+        let full_velocity = half_velocity + half * acceleration;
+        if HALF {
+            half_velocity.store(&mut numbers[4..8]);
+            full_velocity.only(vector).store(velocity);
+        } else {
+            half_velocity.store(velocity);
+            L::select(vector, full_velocity, L::splat(numbers[3])).store(&mut numbers[4..8]);
+        }
         if !MEASURE {
             continue;
         }
@@ -346,13 +381,13 @@ fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]],
         let loads = &loads[place..];
         place += group.len();
         if group.len() == W::WIDTH && slice.record[group.clone()].iter().all(|record| record.inverse_mass > 0.0) {
-            turn_free::<W>(slice, index, loads, &times);
+            turn_free::<W>(slice, index, loads, &times, motion.velocities);
             continue;
         }
         for (index, load) in group.zip(loads) {
             let (record, shape) = (&slice.record[index], &mut slice.shape[index]);
             if record.inverse_mass > 0.0 {
-                turn_free::<f64>(slice, index, std::slice::from_ref(load), &times);
+                turn_free::<f64>(slice, index, std::slice::from_ref(load), &times, motion.velocities);
             } else {
                 shape.orientation = times.advance_driven(shape.orientation, record.spin);
             }
@@ -362,7 +397,7 @@ fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]],
 
 /// Turn the free ellipsoids from `index` on.
 #[inline(always)]
-fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times: &Rotation) {
+fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times: &Rotation, velocities: Velocities) {
     let mut offsets = [0; BLOCK];
     let (mut spin, mut torque) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
     for lane in 0..W::WIDTH {
@@ -374,19 +409,24 @@ fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times
     }
     let [a, b, c, _, w, x, y, z] = W::gather_shapes(&slice.shape[index..], &offsets);
     let record = W::gather(&slice.record[index..], &offsets);
+    let spin = match velocities {
+        Velocities::FullStep => [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])],
+        Velocities::HalfStep => [record[8], record[9], record[10]],
+    };
     let body = Body {
         semi_axes: [a, b, c],
         inverse_mass: record[11],
         orientation: [w, x, y, z],
-        spin: [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])],
+        spin,
         torque: [W::load(&torque[0]), W::load(&torque[1]), W::load(&torque[2])],
     };
     let (orientation, Spins { half, full }) = times.advance(&body);
     let shapes: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.shape[index..]);
     W::scatter(orientation, shapes, SHAPE, 4);
-    W::scatter([half[0], half[1], half[2], W::splat(0.0)], slice.spin[index..].as_flattened_mut(), 4, 0);
+    let (seen, other) = if velocities == Velocities::HalfStep { (half, full) } else { (full, half) };
+    W::scatter([other[0], other[1], other[2], W::splat(0.0)], slice.spin[index..].as_flattened_mut(), 4, 0);
     let records: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.record[index..]);
-    W::scatter([full[0], full[1], full[2], record[11]], records, RECORD, 8);
+    W::scatter([seen[0], seen[1], seen[2], record[11]], records, RECORD, 8);
 }
 
 /// What a particle outside the cell did.
@@ -443,13 +483,19 @@ pub fn wrapped(x: f64, side: f64) -> (f64, i32) {
 
 /// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
 #[inline(always)]
-fn add_external_work(ledger: &mut [f64; LEDGER.len()], record: &Record, load: &[f64; 8], motion: &StepMotion) {
+fn add_external_work(
+    ledger: &mut [f64; LEDGER.len()],
+    record: &Record,
+    velocity: [f64; 3],
+    load: &[f64; 8],
+    motion: &StepMotion,
+) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     if record.inverse_mass > 0.0 {
-        ledger[1] += dot(motion.gravity, record.velocity) / record.inverse_mass * motion.time_step;
+        ledger[1] += dot(motion.gravity, velocity) / record.inverse_mass * motion.time_step;
     } else {
         let (force, torque) = ([load[0], load[1], load[2]], [load[4], load[5], load[6]]);
-        ledger[2] -= (dot(force, record.velocity) + dot(torque, record.spin)) * motion.time_step;
+        ledger[2] -= (dot(force, velocity) + dot(torque, record.spin)) * motion.time_step;
     }
 }
 

@@ -83,7 +83,12 @@ impl Model {
     #[must_use]
     pub fn extras(&self) -> Extras {
         let output = &self.config.output;
-        Extras { orientation: output.orientations, ellipsoids: self.ellipsoids, ledger: output.energy_ledger }
+        Extras {
+            orientation: output.orientations,
+            ellipsoids: self.ellipsoids,
+            ledger: output.energy_ledger,
+            velocities: self.config.velocities,
+        }
     }
 
     /// What ghosts bring each step. Every law may damp or rub, so they always carry velocities.
@@ -454,6 +459,7 @@ impl Simulation {
             rotation: self.model.rotation,
             ledger: extras.ledger,
             orientation: extras.orientation,
+            velocities: extras.velocities,
             watch: self.budget.displacement.watch,
             simd: self.model.simd,
         }

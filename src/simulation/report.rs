@@ -114,9 +114,10 @@ impl Simulation {
         let gradient = self.peculiar_gradient();
         for index in 0..self.particles.owned {
             let record = &self.particles.record[index];
+            let [_, (velocity, spin)] = self.particles.velocities(index);
             let dot = |a: [f64; 3]| a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
             // Peculiar velocity: relative to the affine flow of the cell.
-            let velocity = [0, 1, 2].map(|k| record.velocity[k] - gradient[k] * record.position[k]);
+            let velocity = [0, 1, 2].map(|k| velocity[k] - gradient[k] * record.position[k]);
             let squared = dot(velocity);
             if record.inverse_mass > 0.0 && squared > max_speed {
                 max_speed = squared;
@@ -126,8 +127,8 @@ impl Simulation {
             }
             let mass = self.mass(index);
             let kinetic = match self.particles.shape.get(index) {
-                Some(shape) => 0.5 * mass * squared + rotational_energy(mass, shape, record.spin),
-                None => 0.5 * (mass * squared + 0.4 * mass * (record.radius * record.radius) * dot(record.spin)),
+                Some(shape) => 0.5 * mass * squared + rotational_energy(mass, shape, spin),
+                None => 0.5 * (mass * squared + 0.4 * mass * (record.radius * record.radius) * dot(spin)),
             };
             sums[ParticleSum::Kinetic as usize].add(kinetic);
             for k in 0..3 {

@@ -17,6 +17,7 @@ impl Simulation {
         (0..self.particles.owned)
             .map(|index| {
                 let record = &self.particles.record[index];
+                let [_, (velocity, angular_velocity)] = self.particles.velocities(index);
                 let volume = ellipsoid_volume(self.particles.semi_axes(index));
                 let lines = self.contacts.lines_of(index);
                 let virial = lines.fold(0.0, |sum, (line, is_second)| sum + virials[line][usize::from(is_second)]);
@@ -27,8 +28,8 @@ impl Simulation {
                     radius: record.radius,
                     semi_axes: self.particles.semi_axes(index),
                     orientation: self.particles.orientation_of(index),
-                    velocity: record.velocity,
-                    angular_velocity: record.spin,
+                    velocity,
+                    angular_velocity,
                     stress_trace: virial / volume,
                     coordination: self.touching(index),
                     reserved: 0,

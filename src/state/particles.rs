@@ -2,10 +2,11 @@
 
 use super::shape::{Shape, UPRIGHT, ellipsoid_mass};
 use super::{LEDGER, ParticleState};
+use crate::force::law::Velocities;
 use bytemuck::{Pod, Zeroable};
 
 /// What the contact pass reads of a particle, packed into 96 bytes so that one contact touches two
-/// short runs of memory. Velocities are those at the full step (W 2.3).
+/// short runs of memory. Velocities are those that the laws are given, see [`Velocities`].
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Record {
@@ -13,11 +14,11 @@ pub struct Record {
     pub position: [f64; 3],
     /// Radius; of an ellipsoid that of the sphere around it, its largest semi-axis \[m\].
     pub radius: f64,
-    /// Velocity at the full step \[m/s\] (BCT: peculiar, BC: absolute).
+    /// Velocity at the full step, or at the half step before \[m/s\] (BCT: peculiar, BC: absolute).
     pub velocity: [f64; 3],
     /// The radius once more \[m\]: the contact pass needs the difference of two radii and their sum.
     pub radius_again: f64,
-    /// Angular velocity at the full step \[rad/s\].
+    /// Angular velocity, of the same time as the velocity \[rad/s\].
     pub spin: [f64; 3],
     /// 1/m \[1/kg\]; 0 for driven particles.
     pub inverse_mass: f64,
@@ -52,9 +53,11 @@ pub struct Particles {
     pub shape: Vec<Shape>,
     /// Periodic images crossed since the start (all).
     pub image: Vec<[i32; 3]>,
-    /// Velocity at the last half step; the fourth number is 0.
+    /// What velocities records have.
+    pub seen: Velocities,
+    /// The velocity that records do not have, as a rule that at the last half step \[m/s\]; the fourth number is 0.
     pub velocity: Vec<[f64; 4]>,
-    /// Angular velocity at the last half step; the fourth number is 1/I, I = 2/5 m R² \[1/(kg m²)\], 0 for driven
+    /// The angular velocity that records do not have \[rad/s\]; the fourth number is 1/I, I = 2/5 m R² \[1/(kg m²)\], 0 for driven
     /// particles, and for ellipsoids, whose inertia is no single number.
     pub spin: Vec<[f64; 4]>,
     /// Orientations of spheres, unit quaternions (w, x, y, z); empty where they are not followed, and
@@ -73,19 +76,24 @@ pub struct Extras {
     pub ellipsoids: bool,
     /// Energy ledger.
     pub ledger: bool,
+    /// What velocities records have.
+    pub velocities: Velocities,
 }
 
 impl Particles {
     /// Owned particles from their states.
     #[must_use]
     pub fn from_states(states: &[ParticleState], species: &[SpeciesConstants], extras: Extras) -> Self {
-        let mut particles = Self { owned: states.len(), ellipsoids: extras.ellipsoids, ..Self::default() };
+        let mut particles =
+            Self { owned: states.len(), ellipsoids: extras.ellipsoids, seen: extras.velocities, ..Self::default() };
         for state in states {
             let constants = species[state.species as usize];
+            let (half, full) = ((state.velocity, state.spin), (state.full_velocity, state.full_spin));
+            let (seen, other) = if extras.velocities == Velocities::HalfStep { (half, full) } else { (full, half) };
             particles.id.push(state.id);
             particles.species.push(state.species);
             particles.image.push(state.image);
-            particles.velocity.push(padded(state.velocity));
+            particles.velocity.push(padded(other.0));
             if extras.ellipsoids {
                 particles.shape.push(Shape::new(state.semi_axes, state.orientation));
             } else if extras.orientation {
@@ -97,15 +105,15 @@ impl Particles {
             let mass = ellipsoid_mass(state.semi_axes, constants.density);
             let turns_by_shape = constants.driven || extras.ellipsoids;
             let inverse_inertia = if turns_by_shape { 0.0 } else { 2.5 / (mass * state.radius * state.radius) };
-            let [x, y, z] = state.spin;
+            let [x, y, z] = other.1;
             particles.spin.push([x, y, z, inverse_inertia]);
             particles.record.push(Record {
                 // Never −0.
                 position: state.position.map(|x| x + 0.0),
                 radius: state.radius,
-                velocity: state.full_velocity,
+                velocity: seen.0,
                 inverse_mass: if constants.driven { 0.0 } else { 1.0 / mass },
-                spin: state.full_spin,
+                spin: seen.1,
                 radius_again: state.radius,
             });
         }
@@ -116,21 +124,30 @@ impl Particles {
     #[must_use]
     pub fn state(&self, index: usize) -> ParticleState {
         let record = &self.record[index];
+        let [half, full] = self.velocities(index);
         ParticleState {
             id: self.id[index],
             species: self.species[index],
             position: record.position,
             radius: record.radius,
             semi_axes: self.semi_axes(index),
-            velocity: trimmed(self.velocity[index]),
-            full_velocity: record.velocity,
-            spin: trimmed(self.spin[index]),
-            full_spin: record.spin,
+            velocity: half.0,
+            full_velocity: full.0,
+            spin: half.1,
+            full_spin: full.1,
             orientation: self.orientation_of(index),
             ledger: self.ledger.get(index).copied().unwrap_or_default(),
             image: self.image[index],
             reserved: 0,
         }
+    }
+
+    /// Velocity \[m/s\] and angular velocity \[rad/s\] of an owned particle at the last half step and at the full step.
+    #[must_use]
+    pub fn velocities(&self, index: usize) -> [([f64; 3], [f64; 3]); 2] {
+        let seen = (self.record[index].velocity, self.record[index].spin);
+        let other = (trimmed(self.velocity[index]), trimmed(self.spin[index]));
+        if self.seen == Velocities::HalfStep { [seen, other] } else { [other, seen] }
     }
 
     /// Semi-axes of a particle \[m\].

@@ -1,12 +1,13 @@
 //! Random particles that every rank can compute for itself.
 
 use dem_mpi::exchange::{Communicator, Decomposition, MigrationSetting};
+use dem_mpi::force::law::Velocities;
 use dem_mpi::state::ParticleState;
 use dem_mpi::state::particles::{Extras, SpeciesConstants};
 
 pub const SPECIES: [SpeciesConstants; 2] =
     [SpeciesConstants { density: 1000.0, driven: false }, SpeciesConstants { density: 2500.0, driven: true }];
-pub const ALL: Extras = Extras { orientation: false, ellipsoids: true, ledger: true };
+pub const ALL: Extras = Extras { orientation: false, ellipsoids: true, ledger: true, velocities: Velocities::FullStep };
 
 /// A number in 0 … 1 that depends on its keys alone.
 pub fn random(keys: [u64; 3]) -> f64 {

@@ -14,7 +14,7 @@ fn constants(friction: f64) -> PairProperties {
     PairProperties { friction, ..properties(1e9, 0.3, Vec::new()) }
 }
 
-fn law(friction: f64, settings: &[(&str, &str)]) -> Mindlin<1> {
+fn law(friction: f64, settings: &[(&str, &str)]) -> Mindlin<1, true> {
     let shear = ShearSprings::elastic(&constants(friction));
     Mindlin::new(&choice(Role::Tangential, "mindlin", settings), &shear, friction)
 }
@@ -125,7 +125,7 @@ fn the_stored_force_turns_rigidly_with_a_rolling_and_spinning_contact() {
 
 /// Work of the tangential force along a path of (overlap, displacement), and the ledger at its end.
 fn work_along(
-    law: &mut Mindlin<1>,
+    law: &mut Mindlin<1, true>,
     duration: f64,
     steps: usize,
     path: impl Fn(f64) -> (f64, f64),
@@ -176,29 +176,49 @@ fn the_ledger_closes_over_stick_slip_with_damping_and_varying_overlap() {
     assert!(error(16_000) < 0.4 * error(4000), "{} {}", error(4000), error(16_000));
 }
 
-#[test]
-fn a_sticking_oscillator_loses_energy_only_by_the_extrapolated_velocity() {
-    // Share of the amplitude lost in about 16 periods at Δt = relative/ω. Increments taken at the end of
-    // the step would lose nearly all of it (damping ratio ωΔt/4).
-    let loss = |relative: f64| {
-        let step = relative * (MASS / stiffness(OVERLAP)).sqrt();
-        let steps = (100.0 / relative) as usize;
-        let mut law = law(1e9, &[("damping", "false")]);
-        law.prepare(step);
-        let (mut memory, mut half_step_speed, mut acceleration) = ([0.0; 4], 1e-3, 0.0);
-        let mut late: f64 = 0.0;
-        for k in 0..steps {
-            let touch = sliding(OVERLAP, half_step_speed + 0.5 * acceleration * step);
-            acceleration = -law.evaluate(&touch, &normal(&touch), &mut memory).value[0] / MASS;
-            half_step_speed += acceleration * step;
-            if (steps - k) as f64 * relative < 7.0 {
-                late = late.max(half_step_speed.abs());
-            }
+/// The share by which the largest speed of a body on a sticking, undamped contact grows over 100 radians at
+/// Δt = relative/ω.
+fn growth<const AHEAD: bool>(relative: f64) -> f64 {
+    let step = relative * (MASS / stiffness(OVERLAP)).sqrt();
+    let steps = (100.0 / relative) as usize;
+    let shear = ShearSprings::elastic(&constants(1e9));
+    let choice = choice(Role::Tangential, "mindlin", &[("damping", "false")]);
+    let mut law = Mindlin::<1, AHEAD>::new(&choice, &shear, 1e9);
+    law.prepare(step);
+    let (mut memory, mut half_step_speed, mut acceleration) = ([0.0; 4], 1e-3, 0.0);
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    for k in 0..steps {
+        let extrapolated = half_step_speed + 0.5 * acceleration * step;
+        let touch = sliding(OVERLAP, if AHEAD { extrapolated } else { half_step_speed });
+        acceleration = -law.evaluate(&touch, &normal(&touch), &mut memory).value[0] / MASS;
+        half_step_speed += acceleration * step;
+        if (k as f64) * relative < 7.0 {
+            early = early.max(half_step_speed.abs());
         }
-        1.0 - late / 1e-3
-    };
-    assert!(loss(0.17) < 0.2, "{}", loss(0.17));
-    assert!(loss(0.02) < 1e-3, "{}", loss(0.02));
+        if (steps - k) as f64 * relative < 7.0 {
+            late = late.max(half_step_speed.abs());
+        }
+    }
+    late / early - 1.0
+}
+
+#[test]
+fn a_sticking_oscillator_gains_at_third_order_with_extrapolated_velocities() {
+    // Per step the amplitude grows by (ωΔt)⁴/8. Increments taken at the end of the step would lose it all instead.
+    for relative in [0.1, 0.17, 0.25] {
+        let expected = libm::exp(93.0 * (relative * relative * relative) / 8.0) - 1.0;
+        let found = growth::<true>(relative);
+        assert!((found / expected - 1.0).abs() < 0.15, "{relative}: {found} {expected}");
+    }
+}
+
+#[test]
+fn a_sticking_oscillator_keeps_its_energy_with_the_velocities_of_half_steps() {
+    for relative in [0.02, 0.17, 0.5, 1.0] {
+        let found = growth::<false>(relative);
+        assert!(found.abs() < 1e-2, "{relative}: {found}");
+    }
+    assert!(growth::<false>(0.02).abs() < 1e-4);
 }
 
 #[test]
@@ -223,7 +243,7 @@ fn the_spring_relaxes_with_the_branches_of_the_normal_law() {
         [(4e8, 0.05), (8e8, 0.6)].map(|(modulus, relaxation_time)| MaxwellBranch { modulus, relaxation_time });
     let constants = PairProperties { maxwell: [branches.to_vec(), branches.to_vec()], ..constants(1e9) };
     let shear = ShearSprings::<3>::relaxing(&constants);
-    let mut law = Mindlin::new(&choice(Role::Tangential, "mindlin", &[("damping", "false")]), &shear, 1e9);
+    let mut law = Mindlin::<3, true>::new(&choice(Role::Tangential, "mindlin", &[("damping", "false")]), &shear, 1e9);
     let (steps, step, push) = (2000, 1e-3, 0.2);
     law.prepare(step);
     let (mut memory, mut energies, mut work) = ([0.0; 10], Energies::zero(), 0.0);
