@@ -172,6 +172,12 @@ impl Run {
             }
             self.output.progress(&self.simulation);
         }
+        let step = self.simulation.global().step;
+        if step > 0 && step == self.first_step && self.simulation.comm().rank() == 0 {
+            eprintln!(
+                "dem-mpi: all stages ended with step {step}: nothing to do; add a stage or let the last one go on"
+            );
+        }
         self.finish()
     }
 

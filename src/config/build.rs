@@ -14,11 +14,13 @@ use std::path::Path;
 /// (`stage.0.duration=2 s`); `output` and `threads` come from the command line and outdo the file.
 ///
 /// # Errors
-/// [`Error::File`] if the file cannot be read, [`Error::Input`] with every problem found in it.
+/// [`Error::Input`] if the file cannot be read, or with every problem found in it.
 pub fn load(path: &Path, overrides: &[String], output: Option<&Path>, threads: Option<usize>) -> Result<Config> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::File {
-        path: path.to_owned(),
-        message: format!("the input cannot be read ({error}); check the path, or make one with `dem-mpi init`"),
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        // Without an ending it may have been meant for a command.
+        let commands = if path.extension().is_none() { "; `dem-mpi --help` lists the commands" } else { "" };
+        let remedy = format!("check the path, or make one with `dem-mpi init`{commands}");
+        Error::Input(format!("{}: the input cannot be read ({error}); {remedy}", path.display()))
     })?;
     Config::parse(&text, path, overrides, output, threads)
 }

@@ -40,7 +40,7 @@ pub struct Packing {
 ///
 /// # Errors
 /// [`Error::Packing`] if the input gives no particle, the solid fraction or the sides cannot be met,
-/// or particles overlap; [`Error::File`] if a particle file cannot be used.
+/// or particles overlap; [`Error::Input`] if a particle file cannot be used.
 pub fn build(config: &Config) -> Result<Packing> {
     let packing = match &config.packing {
         PackingConfig::RandomClose { contraction_rate, max_moves_per_particle } => {
@@ -159,7 +159,8 @@ fn from_file(config: &Config, path: &std::path::Path) -> Result<Packing> {
         .into_iter()
         .enumerate()
         .map(|(id, row)| {
-            check_density(config, id, &row).map_err(|message| Error::File { path: path.to_owned(), message })?;
+            check_density(config, id, &row)
+                .map_err(|message| Error::Input(format!("{}: {message}", path.display())))?;
             let semi_axes = row.semi_axes.unwrap_or([row.radius; 3]);
             let mut particle = at_rest_in_its_species(config, id, row.species, row.position, semi_axes);
             particle.orientation = row.orientation.unwrap_or(particle.orientation);

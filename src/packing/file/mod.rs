@@ -91,21 +91,21 @@ const MAX_PROBLEMS: usize = 10;
 /// Positions beyond a periodic face are wrapped.
 ///
 /// # Errors
-/// [`Error::File`] with line, column, value and remedy of every problem (the first ten); a box that is not
+/// [`Error::Input`] with line, column, value and remedy of every problem (the first ten); a box that is not
 /// that of `region`; a table without sides in `region`.
 pub fn read(path: &Path, species: &[&str], region: &Region) -> Result<Contents> {
     let read = format(path).and_then(|format| match format {
         Format::Lammps => lammps::read(path, species, region),
         Format::Csv | Format::Hdf5 => from_table(&table(path, format)?, species, region),
     });
-    read.map_err(|message| Error::File { path: path.to_owned(), message })
+    read.map_err(|message| Error::Input(format!("{}: {message}", path.display())))
 }
 
 /// Names for the species of a file, for callers that have no input: the names in a table, in the order of
 /// their first use, or the numbers of the types of a LAMMPS data file.
 ///
 /// # Errors
-/// [`Error::File`] as for [`read`].
+/// [`Error::Input`] as for [`read`].
 pub fn species_names(path: &Path) -> Result<Vec<String>> {
     let names = format(path).and_then(|format| match format {
         Format::Lammps => lammps::header(path).map(|header| (1..=header.types).map(|t| t.to_string()).collect()),
@@ -114,7 +114,7 @@ pub fn species_names(path: &Path) -> Result<Vec<String>> {
             table.species.into_iter().filter(|name| seen.insert(name.clone())).collect()
         }),
     });
-    names.map_err(|message| Error::File { path: path.to_owned(), message })
+    names.map_err(|message| Error::Input(format!("{}: {message}", path.display())))
 }
 
 fn format(path: &Path) -> std::result::Result<Format, String> {
