@@ -15,7 +15,6 @@ pub(super) enum Chosen<'a> {
 }
 
 /// One of several alternatives: a section with these keys, or a plain value.
-/// One of several alternatives: a section with these keys, or a plain value.
 struct Alternative {
     name: &'static str,
     keys: Option<&'static [Key]>,
@@ -95,7 +94,9 @@ impl<'a> Section<'a> {
                 Some(Chosen::Table(alternative.name, child))
             }
             (None, node) => {
-                let value = self.quantity(node?, &path, &alternative.kind);
+                // A message names what the user wrote.
+                let given = self.lookup(name).1.is_some_and(|node| node.entries().is_some());
+                let value = self.quantity(node?, if given { &path } else { name }, &alternative.kind);
                 if let Some(value) = value {
                     self.record(&path, value, &unit_of(&alternative.kind));
                 }
