@@ -184,34 +184,42 @@ pub struct Batch<'a> {
 
 /// Sum the forces on some particles of a slice and move them one step.
 pub fn advance(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    match batch.motion.velocities {
+        Velocities::FullStep => advance_seen::<false>(slice, batch, result),
+        Velocities::HalfStep => advance_seen::<true>(slice, batch, result),
+    }
+}
+
+/// As [`advance`]. `HALF`: records have the velocities of the half step.
+fn advance_seen<const HALF: bool>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
     match batch.motion.simd {
         // SAFETY: a level is chosen only if the processor has it (`Simd::is_available`).
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx512 => unsafe { advance_avx512(slice, batch, result) },
+        Simd::Avx512 => unsafe { advance_avx512::<HALF>(slice, batch, result) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Simd::Avx2 => unsafe { advance_avx2(slice, batch, result) },
-        _ => advance_range::<Portable<4>, f64>(slice, batch, result),
+        Simd::Avx2 => unsafe { advance_avx2::<HALF>(slice, batch, result) },
+        _ => advance_range::<Portable<4>, f64, HALF>(slice, batch, result),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn advance_avx2(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    advance_range::<F64x4, F64x4>(slice, batch, result);
+fn advance_avx2<const HALF: bool>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    advance_range::<F64x4, F64x4, HALF>(slice, batch, result);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl")]
-fn advance_avx512(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
-    advance_range::<F64x4, F64x8>(slice, batch, result);
+fn advance_avx512<const HALF: bool>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+    advance_range::<F64x4, F64x8, HALF>(slice, batch, result);
 }
 
 /// Sums first, then the motion, a particle at a time in lanes (x, y, z, not used). A position shares its lanes
 /// and the velocity with the radius, the spin with 1/m; constants that are 0 or 1 in the fourth lane leave them.
 /// Ellipsoids turn before, in the lanes `W` side by side.
 #[inline(always)]
-fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
+fn advance_range<L: Lane, W: Lane, const HALF: bool>(slice: &mut Slice, batch: Batch, result: &mut StepResult) {
     const { assert!(L::WIDTH == 4) };
     align_stack();
     let Batch { range, chunk, mut lines, loads, motion } = batch;
@@ -219,31 +227,13 @@ fn advance_range<L: Lane, W: Lane>(slice: &mut Slice, batch: Batch, result: &mut
     if motion.ledger {
         for (place, (index, load)) in range.clone().zip(&*loads).enumerate() {
             lines.add_ledger(chunk.of(place), &mut slice.ledger[index]);
-            let velocity = match motion.velocities {
-                Velocities::FullStep => slice.record[index].velocity,
-                Velocities::HalfStep => trimmed(slice.velocity[index]),
-            };
+            let velocity = if HALF { trimmed(slice.velocity[index]) } else { slice.record[index].velocity };
             add_external_work(&mut slice.ledger[index], &slice.record[index], velocity, load, motion);
         }
     }
     if !slice.shape.is_empty() {
-        turn_all::<W>(slice, range.clone(), loads, motion);
+        turn_all::<W, HALF>(slice, range.clone(), loads, motion);
     }
-    match motion.velocities {
-        Velocities::FullStep => move_seen::<L, false>(slice, range, loads, motion, result),
-        Velocities::HalfStep => move_seen::<L, true>(slice, range, loads, motion, result),
-    }
-}
-
-/// The motion of particles under these forces and torques; `HALF`: records have the velocities of the half step.
-#[inline(always)]
-fn move_seen<L: Lane, const HALF: bool>(
-    slice: &mut Slice,
-    range: Range<usize>,
-    loads: &[[f64; 8]],
-    motion: &StepMotion,
-    result: &mut StepResult,
-) {
     match (motion.rotation && slice.shape.is_empty(), motion.watch == Watch::Displacements) {
         (true, true) => move_all::<L, HALF, true, true>(slice, range, loads, motion, result),
         (true, false) => move_all::<L, HALF, true, false>(slice, range, loads, motion, result),
@@ -252,7 +242,7 @@ fn move_seen<L: Lane, const HALF: bool>(
     }
 }
 
-/// As [`move_seen`]. `TURN`: as spheres also their rotation. `MEASURE`: looking at displacements, not at speeds.
+/// The motion of particles under these forces and torques. `TURN`: as spheres also their rotation. `MEASURE`: looking at displacements, not at speeds.
 #[inline(always)]
 fn move_all<L: Lane, const HALF: bool, const TURN: bool, const MEASURE: bool>(
     slice: &mut Slice,
@@ -372,7 +362,12 @@ fn leading<L: Lane>(lanes: L) -> [f64; 3] {
 
 /// Turn ellipsoids, as many side by side as there are lanes where that many free ones follow each other.
 #[inline(always)]
-fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]], motion: &StepMotion) {
+fn turn_all<W: Lane, const HALF: bool>(
+    slice: &mut Slice,
+    range: Range<usize>,
+    loads: &[[f64; 8]],
+    motion: &StepMotion,
+) {
     let times = Rotation { kick: 0.5 * (motion.previous_time_step + motion.time_step), time_step: motion.time_step };
     let mut place = 0;
     while place < range.len() {
@@ -381,13 +376,13 @@ fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]],
         let loads = &loads[place..];
         place += group.len();
         if group.len() == W::WIDTH && slice.record[group.clone()].iter().all(|record| record.inverse_mass > 0.0) {
-            turn_free::<W>(slice, index, loads, &times, motion.velocities);
+            turn_free::<W, HALF>(slice, index, loads, &times);
             continue;
         }
         for (index, load) in group.zip(loads) {
             let (record, shape) = (&slice.record[index], &mut slice.shape[index]);
             if record.inverse_mass > 0.0 {
-                turn_free::<f64>(slice, index, std::slice::from_ref(load), &times, motion.velocities);
+                turn_free::<f64, HALF>(slice, index, std::slice::from_ref(load), &times);
             } else {
                 shape.orientation = times.advance_driven(shape.orientation, record.spin);
             }
@@ -397,7 +392,7 @@ fn turn_all<W: Lane>(slice: &mut Slice, range: Range<usize>, loads: &[[f64; 8]],
 
 /// Turn the free ellipsoids from `index` on.
 #[inline(always)]
-fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times: &Rotation, velocities: Velocities) {
+fn turn_free<W: Lane, const HALF: bool>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times: &Rotation) {
     let mut offsets = [0; BLOCK];
     let (mut spin, mut torque) = ([[0.0; BLOCK]; 3], [[0.0; BLOCK]; 3]);
     for lane in 0..W::WIDTH {
@@ -409,10 +404,8 @@ fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times
     }
     let [a, b, c, _, w, x, y, z] = W::gather_shapes(&slice.shape[index..], &offsets);
     let record = W::gather(&slice.record[index..], &offsets);
-    let spin = match velocities {
-        Velocities::FullStep => [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])],
-        Velocities::HalfStep => [record[8], record[9], record[10]],
-    };
+    let of_record = [record[8], record[9], record[10]];
+    let spin = if HALF { of_record } else { [W::load(&spin[0]), W::load(&spin[1]), W::load(&spin[2])] };
     let body = Body {
         semi_axes: [a, b, c],
         inverse_mass: record[11],
@@ -423,7 +416,7 @@ fn turn_free<W: Lane>(slice: &mut Slice, index: usize, loads: &[[f64; 8]], times
     let (orientation, Spins { half, full }) = times.advance(&body);
     let shapes: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.shape[index..]);
     W::scatter(orientation, shapes, SHAPE, 4);
-    let (seen, other) = if velocities == Velocities::HalfStep { (half, full) } else { (full, half) };
+    let (seen, other) = if HALF { (half, full) } else { (full, half) };
     W::scatter([other[0], other[1], other[2], W::splat(0.0)], slice.spin[index..].as_flattened_mut(), 4, 0);
     let records: &mut [f64] = bytemuck::cast_slice_mut(&mut slice.record[index..]);
     W::scatter([seen[0], seen[1], seen[2], record[11]], records, RECORD, 8);
