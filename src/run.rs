@@ -174,9 +174,7 @@ impl Run {
         }
         let step = self.simulation.global().step;
         if step > 0 && step == self.first_step && self.simulation.comm().rank() == 0 {
-            eprintln!(
-                "dem-mpi: all stages ended with step {step}: nothing to do; add a stage or let the last one go on"
-            );
+            eprintln!("dem-mpi: all stages ended with step {step}: nothing to do; to go on, add a stage to the input");
         }
         self.finish()
     }

@@ -123,7 +123,19 @@ pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initia
             particle.id, particle.species
         )));
     }
-    let Checkpoint { global, particles, memory, columns, .. } = checkpoint;
+    let Checkpoint { mut global, particles, memory, columns, .. } = checkpoint;
+    let programme = programme(config);
+    // A stage that was added to a complete run has not been entered yet.
+    if global.step == global.stage_start_step {
+        programme.enter(&mut global);
+    }
+    if programme.quasi_static_stage(&global).is_some() && global.quasi_static.is_none() {
+        return Err(Error::Input(format!(
+            "the checkpoint does not fit this input: it is from the middle of stage {}, which was dynamic and here is \
+             quasi-static; restart with the stages of that run, or add one at the end",
+            global.stage
+        )));
+    }
     Ok(Initial { global, particles, memory, columns })
 }
 

@@ -103,3 +103,34 @@ fn dents_and_necks_survive_a_restart_on_any_rank_count() {
         assert_eq!(again, reference, "{ranks} ranks");
     }
 }
+
+#[test]
+fn a_stage_added_to_a_complete_run_is_run_as_if_it_had_been_there() {
+    let config = data("mixed_flow.toml");
+    let whole = std::fs::read_to_string(&config).expect("the input is text");
+    let directory = scratch("added");
+    let (first, second) = (whole.find("[[stage]]").expect("a stage"), whole.rfind("[[stage]]").expect("another"));
+    assert!(first < second);
+    let after = second + whole[second..].find("[output]").expect("then output");
+    let short = directory.join("short.toml");
+    std::fs::write(&short, [&whole[..second], &whole[after..]].concat()).expect("the build folder can be written");
+    let run_directory = directory.join("run");
+    let output = launch(&Run { config: &short, ranks: 1, threads: 1 }, &run_directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let restart = ["--restart", run_directory.to_str().expect("a UTF-8 path")];
+    let again = launch(&Run { config: &short, ranks: 1, threads: 1 }, &run_directory, &restart);
+    assert!(again.status.success() && text(&again).contains("nothing to do"), "{}", text(&again));
+    let longer = launch(&Run { config: &config, ranks: 2, threads: 1 }, &run_directory, &restart);
+    assert!(longer.status.success(), "{}", text(&longer));
+    assert_eq!(digest_of(&longer), uninterrupted(&[]).0);
+    // A quasi-static one too.
+    let quasi_static = directory.join("quasi_static.toml");
+    let stage = "[[stage]]\nroutine = \"quasi_static\"\nstrain_increment.z = \"0.01 %\"\nincrements = 1\n";
+    std::fs::write(
+        &quasi_static,
+        [&whole[..after], stage, &whole[after..]].concat().replace("energy_ledger = true", ""),
+    )
+    .expect("the build folder can be written");
+    let relaxed = launch(&Run { config: &quasi_static, ranks: 1, threads: 1 }, &run_directory, &restart);
+    assert!(matches!(relaxed.status.code(), Some(0 | 1)) && !text(&relaxed).contains("panicked"), "{}", text(&relaxed));
+}

@@ -2,10 +2,8 @@
 
 use super::diagnostic::{Problem, Source, render};
 use super::section::{Reader, Section};
-use super::{Config, PairConfig, Routine, Stage, contact, document, keys, particles, routine, settings, stages};
+use super::{Config, Velocities, contact, document, keys, particles, routine, settings, stages};
 use crate::error::{Error, Result};
-use crate::force::law::Velocities;
-use crate::force::registry::LawChoice;
 use std::path::Path;
 
 /// Read and check the input file at `path`.
@@ -71,17 +69,6 @@ fn checked(problems: Vec<Problem>) -> Vec<Problem> {
     problems
 }
 
-/// Velocities of the half step where no contact has a dashpot. The quasi-static routine adds dashpots of its own.
-fn velocities(pairs: &[PairConfig], stages: &[Stage]) -> Velocities {
-    let rolling = |pair: &PairConfig| pair.rolling.as_ref().is_some_and(LawChoice::damps);
-    let quasi_static = stages.iter().any(|stage| stage.routine == Routine::QuasiStatic);
-    if quasi_static || pairs.iter().any(|pair| pair.damps() || rolling(pair)) {
-        Velocities::FullStep
-    } else {
-        Velocities::HalfStep
-    }
-}
-
 fn read(root: &Section, file: &Path) -> Option<Config> {
     let stem = file.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -115,7 +102,7 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     let (mut pairs, max_overlap_fraction) = pairs?;
     let (kinematics, control_interval) = load?;
     let stages = stages?;
-    let velocities = velocities(&pairs, &stages);
+    let velocities = Velocities::of(&pairs, &stages);
     for pair in &mut pairs {
         pair.properties.velocities = velocities;
     }

@@ -3,8 +3,7 @@
 use super::alternatives::Chosen;
 use super::schema::{Default, Key, Kind, Range, Table};
 use super::section::Section;
-use super::{Boundary, CellConfig, Material, PairConfig, Species};
-use crate::force::law::Velocities;
+use super::{Boundary, CellConfig, Material, PairConfig, Species, Velocities};
 use crate::force::registry::{self, LawChoice, LawEntry, PairProperties, ParameterKind, ParameterValue, Role};
 use crate::units::Dimension;
 use std::sync::LazyLock;

@@ -20,13 +20,14 @@ mod shape;
 pub mod sheet;
 mod stages;
 mod values;
+mod velocities;
 
 pub use build::load;
 pub use reference::{example, reference_markdown};
 pub use routine::{Damping, QuasiStaticConfig, Routine};
 pub use shape::ShapeConfig;
+pub use velocities::Velocities;
 
-use crate::force::law::Velocities;
 use crate::force::registry::{LawChoice, PairProperties};
 use std::path::PathBuf;
 

@@ -1,9 +1,9 @@
 //! What a user should know of a law beside these particles: the particles are seen only once they are made, so
 //! these are warnings of the run and not of the input.
 
-use super::law::Velocities;
 use super::registry::LawChoice;
 use super::{becker_kamlah, thornton_ning};
+use crate::config::Velocities;
 use crate::config::{Config, PairConfig, Routine};
 
 /// Sizes of all particles.
@@ -39,8 +39,8 @@ fn of_dashpots(config: &Config) -> Option<String> {
     (!pairs.is_empty()).then(|| {
         format!(
             "{} rub without a tangential dashpot in a run that has other dashpots or quasi-static stages: where they stick they \
-             gain energy at third order in the time step (energy_ledger shows it); give them a restitution below 1 and \
-             damping, or take the dashpots from all",
+             gain energy at third order in the time step; give them dashpots (restitution below 1, damping of the normal \
+             and the tangential law), or take the dashpots from all pairs",
             pairs.join(", ")
         )
     })

@@ -1,12 +1,13 @@
 //! The table of laws for the documentation, written from the registry itself so that it cannot go stale.
 
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
-use super::law::{Column, NormalLaw, RollingLaw, TangentialLaw, Velocities};
+use super::law::{Column, NormalLaw, RollingLaw, TangentialLaw};
 use super::registry::{
     LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role, build_normal, build_rolling,
     build_tangential, laws,
 };
 use super::shear::ShearSprings;
+use crate::config::Velocities;
 use crate::config::{MaxwellBranch, PairConfig};
 use std::fmt::Write;
 

@@ -13,30 +13,7 @@ use super::lane::{Lane, Vector};
 /// Most numbers that a law may hand on, see [`TangentialLaw::early`].
 pub const MAX_EARLY: usize = 18;
 
-/// The velocities that laws are given.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Velocities {
-    /// At the full step, extrapolated with the last acceleration (W 2.3): what dashpots need.
-    #[default]
-    FullStep,
-    /// At the half step before: what led to the present positions. Without dashpots springs need nothing else, and with
-    /// increments that are true displacements they neither gain nor lose energy, up to Δt = 2/ω.
-    HalfStep,
-}
-
-impl Velocities {
-    /// The share of a step's increment `velocity · Δt` that a stored force takes in before it is evaluated; the rest comes
-    /// after. With full-step velocities the trapezoidal rule.
-    #[must_use]
-    pub fn share_before(self) -> f64 {
-        match self {
-            Self::FullStep => 0.5,
-            Self::HalfStep => 1.0,
-        }
-    }
-}
-
-/// Geometry and relative motion of one touch, at the full step, but for velocities as [`Velocities`] says.
+/// Geometry and relative motion of one touch, at the full step, but for velocities as [`Velocities`](crate::config::Velocities) says.
 #[derive(Debug, Clone, Copy)]
 pub struct Touch<L> {
     /// Overlap δ \[m\], > 0 (lanes that do not touch are blended away by the caller).

@@ -2,12 +2,13 @@
 
 use super::composition::TangentialVisitor;
 use super::lane::{Lane, Vector, add, dot, scale, sub};
-use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorResponse, Velocities};
+use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorResponse};
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Slider, Turning, coulomb_limit, slip_loss, stiffness_loss};
+use super::slider::{Slider, Turning, coulomb_limit, kept_share, step_loss, stiffness_loss};
 use crate::config::PairConfig;
+use crate::config::Velocities;
 
 /// Registry entry.
 pub const ENTRY: LawEntry = LawEntry {
@@ -105,14 +106,6 @@ fn relaxation_loss<L: Lane>(before: Vector<L>, slip: Vector<L>, after: Vector<L>
     L::splat(0.5) * (dot(elastic, elastic) - dot(after, after)) / stiffness
 }
 
-/// Energy that a branch dissipates in a step from one force to another: the work of their mean along `slip`, and what the
-/// branch held before, less what it holds after.
-#[inline(always)]
-fn step_loss<L: Lane>(before: Vector<L>, after: Vector<L>, slip: Vector<L>, stiffness: L) -> L {
-    let held = dot(before, before) - dot(after, after);
-    L::splat(0.5) * (dot(add(before, after), slip) + held / stiffness)
-}
-
 /// Hands the law of a pair to the visitor; `choice` is the pair's tangential choice.
 pub fn build<V: TangentialVisitor, const SPRINGS: usize>(
     pair: &PairConfig,
@@ -189,13 +182,15 @@ impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS,
         let last = memory[3 * SPRINGS];
         let limit = coulomb_limit(self.friction, normal.force);
 
+        // Over the step the mean of the radii; one before that is larger has shrunk already, and the force with it.
+        let mean_radius = if AHEAD { radius } else { half * (last.min(radius) + radius) };
         let mut advance = [[zero; 3]; SPRINGS];
         let mut trial = [[zero; 3]; SPRINGS];
         let mut carried = [[zero; 3]; SPRINGS];
         for k in 0..SPRINGS {
             let stored = [memory[3 * k], memory[3 * k + 1], memory[3 * k + 2]];
             carried[k] = scale(turning.turn(stored, early[2 * k]), early[2 * k + 1]);
-            advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * radius);
+            advance[k] = scale(touch.slip_velocity, L::splat(self.increment[k]) * mean_radius);
             // What is not ahead relaxes now; the last spring is the long-term one, whose decay is 1.
             let relaxes = !AHEAD && k + 1 < SPRINGS;
             let before = if relaxes { scale(carried[k], L::splat(self.decay[k])) } else { carried[k] };
@@ -225,10 +220,9 @@ impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS,
                     + relaxation_loss(force, slip, ahead, stiffness);
                 (slipped * dot(trial[k], trial[k]) / stiffness, relaxed)
             } else {
-                let relaxed = step_loss(carried[k], trial[k], slip, stiffness);
-                // The force before had not shrunk with the contact yet.
-                let shrunk = half * dot(carried[k], slip) * (one.max(last / radius) - one);
-                (slip_loss(trial[k], force, slip, stiffness) + shrunk, if self.rate[k] == 0.0 { zero } else { relaxed })
+                let lost = step_loss(carried[k], kept_share(radius, last), force, slip, stiffness);
+                let relaxed = step_loss(carried[k], one, trial[k], slip, stiffness);
+                if self.rate[k] == 0.0 { (lost, zero) } else { (lost - relaxed, relaxed) }
             };
             energies.friction = energies.friction + shrunk + slid;
             energies.viscous = energies.viscous + relaxed;

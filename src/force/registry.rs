@@ -2,8 +2,8 @@
 
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
 pub use super::documentation::table_markdown;
-use super::law::Velocities;
 use super::shear::ShearSprings;
+use crate::config::Velocities;
 use crate::config::{MaxwellBranch, PairConfig};
 
 /// From one line per law, the list of laws and the match that builds them. The line is the name of the

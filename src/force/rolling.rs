@@ -2,10 +2,11 @@
 
 use super::composition::RollingVisitor;
 use super::lane::{Lane, add, dot, scale, sub};
-use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse, Velocities};
+use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
-use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, slip_loss, stiffness_loss};
+use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, step_loss, stiffness_loss};
 use crate::config::PairConfig;
+use crate::config::Velocities;
 
 /// Registry entry.
 pub const ENTRY: LawEntry = LawEntry {
@@ -125,7 +126,7 @@ impl RollingLaw for SpringSlider {
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
         let (half, one) = (L::splat(0.5), L::splat(1.0));
         let step = L::splat(self.time_step);
-        let share = self.velocities.share_before();
+        let (full, share) = (self.velocities == Velocities::FullStep, self.velocities.share_before());
         let (before, ahead) = (L::splat(share * self.time_step), L::splat((1.0 - share) * self.time_step));
         let (a, last) = (normal.contact_radius, memory[4]);
         let square = touch.effective_radius * touch.effective_radius;
@@ -139,7 +140,10 @@ impl RollingLaw for SpringSlider {
         let stiffness = modulus * a * square;
         let stored = [memory[0], memory[1], memory[2]];
         let carried = Turning::new(touch, self.time_step).apply(stored, a, last);
-        let trial = add(carried, scale(roll_rate, before * stiffness));
+        // Over the step the mean of the stiffnesses, see Mindlin's law.
+        let mean = |now: L, last: L| if full { now } else { half * (last.min(now) + now) };
+        let last_stiffness = modulus * last * square;
+        let trial = add(carried, scale(roll_rate, before * mean(stiffness, last_stiffness)));
         let limit = coulomb_limit(self.rolling_friction, normal.force) * touch.effective_radius;
         let slider = Slider::new(trial, limit);
         let (spring, share) = (slider.carry(trial), slider.share);
@@ -147,21 +151,22 @@ impl RollingLaw for SpringSlider {
         let rolling = Slider::new(damped, limit).carry(damped);
         [memory[0], memory[1], memory[2]] = add(spring, scale(roll_rate, ahead * stiffness));
         energies.elastic = half * dot(spring, spring) / stiffness;
-        let slid = if self.velocities == Velocities::FullStep {
+        let slid = if full {
             share * (one - share) * dot(trial, trial) / stiffness
         } else {
-            slip_loss(trial, spring, scale(roll_rate, step), stiffness)
+            step_loss(carried, kept_share(a, last), spring, scale(roll_rate, step), stiffness)
         };
         energies.friction =
-            slid + stiffness_loss(dot(stored, stored), modulus * last * square, dot(carried, carried), stiffness);
+            slid + stiffness_loss(dot(stored, stored), last_stiffness, dot(carried, carried), stiffness);
         energies.damping = dot(sub(rolling, spring), roll_rate) * step;
 
         // Twisting, a scalar along n.
         let stiffness = half * modulus * a * a * a;
         let last_stiffness = half * modulus * last * last * last;
         let stored = memory[3];
-        let carried = stored * kept_share(stiffness, last_stiffness);
-        let trial = carried + twist_rate * before * stiffness;
+        let kept = kept_share(stiffness, last_stiffness);
+        let carried = stored * kept;
+        let trial = carried + twist_rate * before * mean(stiffness, last_stiffness);
         let limit = self.twisting_limit(touch, normal);
         let share = carried_share((trial * trial).sqrt(), limit);
         let spring = trial * share;
@@ -170,11 +175,11 @@ impl RollingLaw for SpringSlider {
         memory[3] = spring + twist_rate * ahead * stiffness;
         memory[4] = a;
         energies.elastic = energies.elastic + half * spring * spring / stiffness;
-        let slid = if self.velocities == Velocities::FullStep {
+        let slid = if full {
             share * (one - share) * trial * trial / stiffness
         } else {
-            let (zero, slip) = (L::splat(0.0), twist_rate * step);
-            slip_loss([trial, zero, zero], [spring, zero, zero], [slip, zero, zero], stiffness)
+            let alone = |value: L| [value, L::splat(0.0), L::splat(0.0)];
+            step_loss(alone(carried), kept, alone(spring), alone(twist_rate * step), stiffness)
         };
         energies.friction =
             energies.friction + slid + stiffness_loss(stored * stored, last_stiffness, carried * carried, stiffness);

@@ -144,12 +144,12 @@ pub fn stiffness_loss<L: Lane>(before: L, last: L, after: L, stiffness: L) -> L 
     loss.only(last.greater(zero))
 }
 
-/// Energy that a slider dissipates in a step along `slip` that would bring a spring to the force `trial`, and that it holds at
-/// `force`: with the spring's own it makes up the work of the mean of the forces before and after. May be negative where a
-/// load is reversed; sums over steps converge at second order in Δt.
+/// Energy that a spring with its slider dissipates in a step along `slip`, with the velocities of the half step: the work of the
+/// mean of the forces before and after, and what the spring held before, less what it holds after. `carried` is the force
+/// before, turned, and shrunk by the factor `shrinkage` ≤ 1 that [`kept_share`] gives.
 #[inline(always)]
 #[must_use]
-pub fn slip_loss<L: Lane>(trial: Vector<L>, force: Vector<L>, slip: Vector<L>, stiffness: L) -> L {
-    let excess = sub(trial, force);
-    L::splat(0.5) * (dot(excess, add(trial, force)) / stiffness - dot(excess, slip))
+pub fn step_loss<L: Lane>(carried: Vector<L>, shrinkage: L, force: Vector<L>, slip: Vector<L>, stiffness: L) -> L {
+    let work = dot(carried, slip) / shrinkage + dot(force, slip);
+    L::splat(0.5) * (work + (dot(carried, carried) - dot(force, force)) / stiffness)
 }

@@ -1,7 +1,8 @@
 //! Helpers of the laws' tests: pairs, touches and a one-contact integrator.
 
-use super::law::{Energies, NormalLaw, Touch, Velocities};
+use super::law::{Energies, NormalLaw, Touch};
 use super::registry::{LawChoice, PairProperties, ParameterKind, ParameterValue, Role, find};
+use crate::config::Velocities;
 use crate::config::{MaxwellBranch, PairConfig};
 
 /// Polyvinylidene fluoride of W Table 1 with its one Maxwell branch.

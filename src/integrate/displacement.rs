@@ -108,7 +108,7 @@ fn largest(values: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::law::Velocities;
+    use crate::config::Velocities;
     use crate::force::simd::Simd;
 
     const SIDES: [f64; 3] = [1.0, 2.0, 0.5];

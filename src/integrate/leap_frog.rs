@@ -6,6 +6,8 @@
 use super::displacement::{StepResult, Watch};
 use super::gather::Lines;
 use super::rotation::{Body, Rotation, Spins};
+use super::wrapping::wrap;
+use crate::config::Velocities;
 use crate::contact::ends::ChunkEnds;
 use crate::contact::list::CHUNK;
 use crate::contact::section::BLOCK;
@@ -13,7 +15,6 @@ use crate::force::lane::portable::Portable;
 use crate::force::lane::{Lane, SHAPE, align_stack, prefetch};
 #[cfg(target_arch = "x86_64")]
 use crate::force::lane::{avx2::F64x4, avx512::F64x8};
-use crate::force::law::Velocities;
 use crate::force::simd::Simd;
 use crate::state::LEDGER;
 use crate::state::particles::{Particles, RECORD, Record, trimmed};
@@ -422,58 +423,6 @@ fn turn_free<W: Lane, const HALF: bool>(slice: &mut Slice, index: usize, loads: 
     W::scatter([seen[0], seen[1], seen[2], record[11]], records, RECORD, 8);
 }
 
-/// What a particle outside the cell did.
-struct Crossing {
-    /// Images crossed.
-    wraps: [i32; 3],
-    /// It went farther than it can.
-    lost: bool,
-}
-
-/// Bring a particle back into the cell, and change its velocity with the face (BC).
-fn wrap(record: &mut Record, velocity: &mut [f64; 4], reference: &mut [f64; 3], motion: &StepMotion) -> Crossing {
-    let mut crossing = Crossing { wraps: [0; 3], lost: false };
-    for k in 0..3 {
-        let (side, x) = (motion.sides[k], record.position[k]);
-        if x >= 0.0 && x < side {
-            continue;
-        }
-        if !motion.periodic[k] {
-            crossing.lost |= x < -record.radius || x > side + record.radius;
-            continue;
-        }
-        let (position, crossed) = wrapped(x, side);
-        crossing.lost |= crossed.abs() > 1;
-        record.position[k] = position;
-        crossing.wraps[k] = crossed;
-        velocity[k] -= f64::from(crossed) * motion.face_velocity[k];
-        if crossed != 0 {
-            reference[k] -= f64::from(crossed) * motion.reference_sides[k];
-        }
-    }
-    crossing
-}
-
-/// Position wrapped into `[0, side)` and the images crossed (+1: left through the high face). Farther
-/// than one side off, the count is 2 or −2: a fault.
-#[inline]
-#[must_use]
-pub fn wrapped(x: f64, side: f64) -> (f64, i32) {
-    if x >= side {
-        let back = x - side;
-        return if back < side { (back, 1) } else { (x, 2) };
-    }
-    if x < 0.0 {
-        let forth = x + side;
-        if forth < 0.0 {
-            return (x, -2);
-        }
-        // A tiny negative x rounds to the side itself, which is the low face.
-        return if forth < side { (forth, -1) } else { (0.0, 0) };
-    }
-    (x, 0)
-}
-
 /// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
 #[inline(always)]
 fn add_external_work(
@@ -510,16 +459,6 @@ fn turned(q: [f64; 4], spin: [f64; 3], time_step: f64) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn wrapping_stays_inside_and_counts_images() {
-        assert_eq!(wrapped(1.5, 1.0), (0.5, 1));
-        assert_eq!(wrapped(-0.25, 1.0), (0.75, -1));
-        assert_eq!(wrapped(-1e-20, 1.0), (0.0, 0));
-        assert_eq!(wrapped(1.0, 1.0), (0.0, 1));
-        assert_eq!(wrapped(2.5, 1.0).1, 2);
-        assert_eq!(wrapped(-2.5, 1.0).1, -2);
-    }
 
     #[test]
     fn turning_about_z_by_small_steps_gives_the_angle() {

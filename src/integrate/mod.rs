@@ -6,3 +6,4 @@ pub mod gather;
 pub mod leap_frog;
 pub mod rotation;
 pub mod time_step;
+mod wrapping;

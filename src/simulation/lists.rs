@@ -3,11 +3,12 @@
 
 use super::{Model, Simulation, Stage};
 use crate::contact::ends::End;
+use crate::contact::list::ContactList;
 use crate::error::{Error, Result};
 use crate::exchange::{HaloPlan, MigrationSetting, migrate};
 use crate::force::pass::PairPass;
 use crate::integrate::displacement::{Displacement, Watch};
-use crate::integrate::leap_frog::StepMotion;
+use crate::integrate::leap_frog::{Reference, StepMotion};
 use crate::neighbour::tiles;
 use crate::neighbour::verlet::Region;
 use crate::state::ContactMemory;
@@ -99,6 +100,13 @@ impl Simulation {
         let near = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing);
         self.budget.displacement.watch = if near { Watch::Displacements } else { Watch::Speeds };
         Ok(())
+    }
+
+    /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
+    pub(super) fn update_ghosts(&mut self) {
+        let content = self.model.ghosts();
+        self.halo.update(&self.comm, &mut self.particles, content, &mut self.ghost_wraps, |_| ());
+        take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
     }
 
     /// What is stale if no particle has moved farther than `displacement` since the contact list was made, relative to
@@ -214,5 +222,13 @@ impl Simulation {
         self.lines.fit(&self.contacts);
         self.reference.take(&self.particles);
         Ok(())
+    }
+}
+
+/// Adjust contacts and counters of ghosts that crossed a periodic face.
+pub(super) fn take_ghost_wraps(wraps: &[(u32, [i32; 3])], contacts: &mut ContactList, reference: &mut Reference) {
+    for (ghost, wraps) in wraps {
+        contacts.apply_wrap(*ghost as usize, *wraps);
+        reference.cross(*ghost as usize, *wraps);
     }
 }

@@ -33,7 +33,7 @@ use crate::load::{LoadProgramme, StepPlan};
 use crate::neighbour::verlet::Candidates;
 use crate::state::particles::{Extras, Particles, SpeciesConstants};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
-use lists::ListBudget;
+use lists::{ListBudget, take_ghost_wraps};
 use std::sync::Arc;
 use strips::{LineBuffers, PassFault, Phase};
 
@@ -346,13 +346,6 @@ impl Simulation {
         }
     }
 
-    /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.
-    fn update_ghosts(&mut self) {
-        let content = self.model.ghosts();
-        self.halo.update(&self.comm, &mut self.particles, content, &mut self.ghost_wraps, |_| ());
-        take_ghost_wraps(&self.ghost_wraps, &mut self.contacts, &mut self.reference);
-    }
-
     fn pass_input<'a>(&self, motion: &'a CellMotion) -> PassInput<'a> {
         PassInput {
             motion,
@@ -493,12 +486,4 @@ impl Simulation {
 
 fn bodies(particles: &Particles) -> BodyData<'_> {
     BodyData { records: &particles.record, shapes: &particles.shape }
-}
-
-/// Adjust contacts and counters of ghosts that crossed a periodic face.
-fn take_ghost_wraps(wraps: &[(u32, [i32; 3])], contacts: &mut ContactList, reference: &mut Reference) {
-    for (ghost, wraps) in wraps {
-        contacts.apply_wrap(*ghost as usize, *wraps);
-        reference.cross(*ghost as usize, *wraps);
-    }
 }

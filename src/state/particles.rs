@@ -2,7 +2,7 @@
 
 use super::shape::{Shape, UPRIGHT, ellipsoid_mass};
 use super::{LEDGER, ParticleState};
-use crate::force::law::Velocities;
+use crate::config::Velocities;
 use bytemuck::{Pod, Zeroable};
 
 /// What the contact pass reads of a particle, packed into 96 bytes so that one contact touches two

@@ -1,7 +1,7 @@
 //! Random particles that every rank can compute for itself.
 
+use dem_mpi::config::Velocities;
 use dem_mpi::exchange::{Communicator, Decomposition, MigrationSetting};
-use dem_mpi::force::law::Velocities;
 use dem_mpi::state::ParticleState;
 use dem_mpi::state::particles::{Extras, SpeciesConstants};
 

@@ -222,6 +222,28 @@ fn a_sticking_oscillator_keeps_its_energy_with_the_velocities_of_half_steps() {
 }
 
 #[test]
+fn with_velocities_of_half_steps_a_growing_contact_stiffens_at_second_order() {
+    // Overlap grows as t², so that the radius goes as t: at slip velocity v the force is ½ f 8 G a v t.
+    let error = |steps: usize| {
+        let step = 1.0 / steps as f64;
+        let shear = ShearSprings::elastic(&constants(1e9));
+        let mut law = Mindlin::<1, false>::new(&choice(Role::Tangential, "mindlin", &[]), &shear, 1e9);
+        law.prepare(step);
+        let (mut memory, mut force) = ([0.0; 4], 0.0);
+        for k in 1..=steps {
+            let time = k as f64 * step;
+            // Slip velocity (t − ½Δt)², at the half step before.
+            let half_time = time - 0.5 * step;
+            let touch = sliding(OVERLAP * time * time, 1e-6 * half_time * half_time);
+            force = law.evaluate(&touch, &normal(&touch), &mut memory).value[0];
+        }
+        (force / (stiffness(OVERLAP) * 1e-6 / 4.0) - 1.0).abs()
+    };
+    assert!(error(1000) < 1e-6, "{}", error(1000));
+    assert!((3.8..4.2).contains(&(error(100) / error(200))), "{}", error(100) / error(200));
+}
+
+#[test]
 fn the_dashpot_never_gives_energy() {
     let mut law = law(0.3, &[]);
     law.prepare(1e-5);

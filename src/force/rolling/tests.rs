@@ -40,8 +40,10 @@ fn stiffnesses_are_those_of_the_tangential_spring_times_the_squared_arms() {
     let touch = spinning(OVERLAP, [0.3, 0.0, 0.7]);
     let normal = normal(&touch);
     let tangential = 8.0 * constants(1.0).effective_shear_modulus() * normal.contact_radius;
-    // With velocities of the full step half a step ahead at the start, as the trapezoidal rule has it.
-    for (velocities, elapsed) in [(Velocities::FullStep, 999.5), (Velocities::HalfStep, 1000.0)] {
+    // Half an increment less at the start: with velocities of the full step as the trapezoidal rule has it, with those of
+    // the half step as there was no stiffness before.
+    let elapsed = f64::from(steps) - 0.5;
+    for velocities in [Velocities::FullStep, Velocities::HalfStep] {
         let choice = choice(Role::Rolling, "spring_slider", &[("damping_ratio", "0")]);
         let mut law = SpringSlider::new(&choice, &PairProperties { velocities, ..constants(1e9) });
         law.prepare(step);
