@@ -27,7 +27,7 @@ pub fn config(species: Vec<Species>) -> Config {
         materials: Vec::new(),
         species,
         pairs: Vec::new(),
-        velocities: crate::config::Velocities::default(),
+        velocities: Velocities::default(),
         packing: PackingConfig::RandomClose { contraction_rate: 5e-4, max_moves_per_particle: 1e5 },
         replication: Replication::NONE,
         gravity: [0.0; 3],
