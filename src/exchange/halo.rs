@@ -184,7 +184,7 @@ impl HaloPlan {
             particles.record.push(ghost.record);
             particles.image.push(ghost.image);
         }
-        if particles.ellipsoids {
+        if particles.extras.ellipsoids {
             self.bring_shapes(comm, particles);
         }
     }

@@ -131,20 +131,8 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
         });
     }
     // Naming every field makes the compiler ask here for a field added later.
-    let Particles {
-        owned,
-        id,
-        species,
-        record,
-        ellipsoids: _,
-        shape,
-        image,
-        seen: _,
-        velocity,
-        spin,
-        orientation,
-        ledger,
-    } = particles;
+    let Particles { owned, id, species, record, extras: _, shape, image, velocity, spin, orientation, ledger } =
+        particles;
     sift(id, &keep);
     sift(species, &keep);
     sift(record, &keep);
@@ -159,20 +147,7 @@ fn keep_owned(particles: &mut Particles, keep: impl Fn(usize) -> bool) {
 
 /// Append the owned particles of `more`. There are no ghosts.
 fn append(particles: &mut Particles, more: Particles) {
-    let Particles {
-        owned,
-        id,
-        species,
-        record,
-        ellipsoids: _,
-        shape,
-        image,
-        seen: _,
-        velocity,
-        spin,
-        orientation,
-        ledger,
-    } = more;
+    let Particles { owned, id, species, record, extras: _, shape, image, velocity, spin, orientation, ledger } = more;
     particles.owned += owned;
     particles.id.extend(id);
     particles.species.extend(species);

@@ -97,7 +97,7 @@ impl<'a> Slice<'a> {
             velocity: &mut particles.velocity,
             spin: &mut particles.spin,
             orientation: &mut particles.orientation,
-            shape: if particles.ellipsoids { &mut particles.shape[..owned] } else { &mut [] },
+            shape: if particles.extras.ellipsoids { &mut particles.shape[..owned] } else { &mut [] },
             ledger: &mut particles.ledger,
             reference: &mut reference.position,
             crossed: &mut reference.crossed[..owned],

@@ -47,14 +47,12 @@ pub struct Particles {
     pub species: Vec<u32>,
     /// Packed records (all).
     pub record: Vec<Record>,
-    /// There are ellipsoids, on this rank or another.
-    pub ellipsoids: bool,
+    /// What is followed, here and on all other ranks.
+    pub extras: Extras,
     /// Semi-axes and orientations (all); empty when every particle of all ranks is a sphere.
     pub shape: Vec<Shape>,
     /// Periodic images crossed since the start (all).
     pub image: Vec<[i32; 3]>,
-    /// What velocities records have.
-    pub seen: Velocities,
     /// The velocity that records do not have, as a rule that at the last half step \[m/s\]; the fourth number is 0.
     pub velocity: Vec<[f64; 4]>,
     /// The angular velocity that records do not have \[rad/s\]; the fourth number is 1/I, I = 2/5 m R² \[1/(kg m²)\], 0 for driven
@@ -67,8 +65,8 @@ pub struct Particles {
     pub ledger: Vec<[f64; LEDGER.len()]>,
 }
 
-/// What of a particle is followed only on request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What of a particle is followed only on request, and what velocities records have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Extras {
     /// Orientations of spheres.
     pub orientation: bool,
@@ -84,8 +82,7 @@ impl Particles {
     /// Owned particles from their states.
     #[must_use]
     pub fn from_states(states: &[ParticleState], species: &[SpeciesConstants], extras: Extras) -> Self {
-        let mut particles =
-            Self { owned: states.len(), ellipsoids: extras.ellipsoids, seen: extras.velocities, ..Self::default() };
+        let mut particles = Self { owned: states.len(), extras, ..Self::default() };
         for state in states {
             let constants = species[state.species as usize];
             let (half, full) = ((state.velocity, state.spin), (state.full_velocity, state.full_spin));
@@ -147,7 +144,7 @@ impl Particles {
     pub fn velocities(&self, index: usize) -> [([f64; 3], [f64; 3]); 2] {
         let seen = (self.record[index].velocity, self.record[index].spin);
         let other = (trimmed(self.velocity[index]), trimmed(self.spin[index]));
-        if self.seen == Velocities::HalfStep { [seen, other] } else { [other, seen] }
+        if self.extras.velocities == Velocities::HalfStep { [seen, other] } else { [other, seen] }
     }
 
     /// Semi-axes of a particle \[m\].
