@@ -3,8 +3,7 @@
 
 use super::registry::LawChoice;
 use super::{becker_kamlah, thornton_ning};
-use crate::config::Velocities;
-use crate::config::{Config, PairConfig, Routine};
+use crate::config::{Config, PairConfig, Routine, Velocities};
 
 /// Sizes of all particles.
 #[derive(Debug, Clone, Copy, PartialEq)]

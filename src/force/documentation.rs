@@ -7,8 +7,7 @@ use super::registry::{
     build_tangential, laws,
 };
 use super::shear::ShearSprings;
-use crate::config::Velocities;
-use crate::config::{MaxwellBranch, PairConfig};
+use crate::config::{MaxwellBranch, PairConfig, Velocities};
 use std::fmt::Write;
 
 /// Markdown table of all laws: key, summary, parameters with range and default, memory columns (of a

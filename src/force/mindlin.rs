@@ -7,8 +7,7 @@ use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
 use super::slider::{Slider, Turning, coulomb_limit, kept_share, step_loss, stiffness_loss};
-use crate::config::PairConfig;
-use crate::config::Velocities;
+use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
 pub const ENTRY: LawEntry = LawEntry {

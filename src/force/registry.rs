@@ -3,8 +3,7 @@
 use super::composition::{NormalVisitor, RollingVisitor, TangentialVisitor};
 pub use super::documentation::table_markdown;
 use super::shear::ShearSprings;
-use crate::config::Velocities;
-use crate::config::{MaxwellBranch, PairConfig};
+use crate::config::{MaxwellBranch, PairConfig, Velocities};
 
 /// From one line per law, the list of laws and the match that builds them. The line is the name of the
 /// law's module in `src/force/`, under the law's role. The module holds `ENTRY`, the law as input and

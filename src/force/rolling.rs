@@ -5,8 +5,7 @@ use super::lane::{Lane, add, dot, scale, sub};
 use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, step_loss, stiffness_loss};
-use crate::config::PairConfig;
-use crate::config::Velocities;
+use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
 pub const ENTRY: LawEntry = LawEntry {

@@ -2,8 +2,7 @@
 
 use super::law::{Energies, NormalLaw, Touch};
 use super::registry::{LawChoice, PairProperties, ParameterKind, ParameterValue, Role, find};
-use crate::config::Velocities;
-use crate::config::{MaxwellBranch, PairConfig};
+use crate::config::{MaxwellBranch, PairConfig, Velocities};
 
 /// Polyvinylidene fluoride of W Table 1 with its one Maxwell branch.
 pub fn pvdf() -> PairProperties {
