@@ -3,7 +3,8 @@
 mod overlap;
 
 use crate::config::{
-    Boundary, Config, Motion, PackingConfig, PairConfig, ParallelConfig, Replication, Routine, TimeStepConfig,
+    Boundary, Config, Kinematics, Motion, PackingConfig, PairConfig, ParallelConfig, Replication, Routine,
+    TimeStepConfig,
 };
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
@@ -17,6 +18,7 @@ use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
 use crate::output::checkpoint::{self, Checkpoint};
 use crate::packing::{self, Packing, Worst};
+use crate::simulation::affine::affine_energy;
 use crate::simulation::{Model, Simulation};
 use crate::state::particles::SpeciesConstants;
 use crate::state::shape::{ellipsoid_mass, is_sphere, smallest_semi_axis};
@@ -94,7 +96,21 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         quasi_static: None,
     };
     programme(config).enter(&mut global);
+    begin_ledgers(config, &global, &mut particles);
     Ok(Initial { global, particles, memory: ContactMemory::new(0), columns: Vec::new() })
+}
+
+/// Where velocities are absolute, ledgers begin with the energy of the cell's motion.
+fn begin_ledgers(config: &Config, global: &GlobalState, particles: &mut [ParticleState]) {
+    if !config.output.energy_ledger || config.kinematics != Kinematics::Bc {
+        return;
+    }
+    let (rate, species) = (LoadProgramme::side_rate(global), species_constants(config));
+    let gradient = [0, 1, 2].map(|k| rate[k] / global.sides[k]);
+    for particle in particles {
+        let mass = ellipsoid_mass(particle.semi_axes, species[particle.species as usize].density);
+        particle.ledger[0] += affine_energy(mass, particle.full_velocity, particle.position, gradient);
+    }
 }
 
 /// The particles of rank 0 on every rank.
@@ -155,23 +171,22 @@ fn programme(config: &Config) -> LoadProgramme {
     LoadProgramme { stages: config.stages.clone(), kinematics: config.kinematics }
 }
 
+fn species_constants(config: &Config) -> Vec<SpeciesConstants> {
+    let of_material = |index: usize| &config.materials[index];
+    let constants = config.species.iter().map(|s| SpeciesConstants {
+        density: of_material(s.material).density * of_material(s.material).density_scaling,
+        driven: matches!(s.motion, Motion::Driven { .. }),
+    });
+    constants.collect()
+}
+
 /// The model: constants of species, passes, bounds, from the input and all particles.
 ///
 /// # Errors
 /// The memory of a checkpoint does not fit the laws of this input; the cell is too small for the
 /// particles.
 pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Result<Model> {
-    let species: Vec<SpeciesConstants> = config
-        .species
-        .iter()
-        .map(|s| {
-            let material = &config.materials[s.material];
-            SpeciesConstants {
-                density: material.density * material.density_scaling,
-                driven: matches!(s.motion, Motion::Driven { .. }),
-            }
-        })
-        .collect();
+    let species = species_constants(config);
     let extremes = extremes(comm, &species, &initial.particles);
     let bodies = match extremes.sizes {
         _ if extremes.ellipsoids => Bodies::Ellipsoids,

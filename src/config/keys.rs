@@ -445,7 +445,9 @@ pub static OUTPUT: Table = Table {
             "energy_ledger",
             Kind::Flag,
             Default::Flag(false),
-            "Keep account of work and dissipation by cause; costs some speed.",
+            "Keep account of work and dissipation by cause; costs some speed. What is held and dissipated less the work stays \
+             the same to second order in the time step (first with friction; not between ellipsoids, whose force law has no \
+             potential). Plastic contacts that begin overlapping count as pressed in before the first row.",
         ),
         key(
             "orientations",

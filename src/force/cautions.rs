@@ -17,7 +17,7 @@ pub struct Sizes {
 /// All warnings, none twice.
 #[must_use]
 pub fn of_run(config: &Config, sizes: Sizes) -> Vec<String> {
-    let own = config.pairs.iter().filter_map(|pair| of_pair(pair, sizes));
+    let own = config.pairs.iter().flat_map(|pair| of_pair(pair, sizes));
     let mut cautions: Vec<String> = own.chain(of_dashpots(config)).collect();
     cautions.dedup();
     cautions
@@ -46,13 +46,13 @@ fn of_dashpots(config: &Config) -> Option<String> {
 }
 
 /// Warnings on one pair of materials.
-fn of_pair(pair: &PairConfig, sizes: Sizes) -> Option<String> {
+fn of_pair(pair: &PairConfig, sizes: Sizes) -> Vec<String> {
     let name = pair.normal.law.name;
     if name == becker_kamlah::ENTRY.name {
-        becker_kamlah::caution(sizes.aspect_ratio)
+        becker_kamlah::caution(sizes.aspect_ratio).into_iter().collect()
     } else if name == thornton_ning::ENTRY.name {
-        thornton_ning::caution(pair, sizes.smallest)
+        thornton_ning::cautions(pair, sizes.smallest)
     } else {
-        None
+        Vec::new()
     }
 }

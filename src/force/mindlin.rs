@@ -6,7 +6,7 @@ use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorR
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Slider, Turning, coulomb_limit, kept_share, step_loss, stiffness_loss};
+use super::slider::{Slider, Turning, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss};
 use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
@@ -204,7 +204,6 @@ impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS,
 
         let mut energies = Energies::zero();
         let slip = scale(touch.slip_velocity, L::splat(self.advance));
-        let slipped = share * (one - share);
         for k in 0..SPRINGS {
             let force = slider.carry(trial[k]);
             let relaxed = if AHEAD && k + 1 < SPRINGS { scale(force, L::splat(self.decay[k])) } else { force };
@@ -217,7 +216,7 @@ impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS,
             let (slid, relaxed) = if AHEAD {
                 let relaxed = relaxation_loss(carried[k], slip, trial[k], stiffness)
                     + relaxation_loss(force, slip, ahead, stiffness);
-                (slipped * dot(trial[k], trial[k]) / stiffness, relaxed)
+                (slip_loss(trial[k], share, slip, stiffness), relaxed)
             } else {
                 let lost = step_loss(carried[k], kept_share(radius, last), force, slip, stiffness);
                 let relaxed = step_loss(carried[k], one, trial[k], slip, stiffness);

@@ -1,7 +1,7 @@
 //! What an observing contact pass collects: exact sums for stress and energies, maxima, samples of
 //! single contacts. Sums are exact, so that no order of ranks, threads or lists shows in them.
 
-use super::lane::{dot, scale, sub};
+use super::lane::{dot, scale};
 use super::law::Energies;
 use super::touches::BlockTouches;
 use crate::contact::section::BLOCK;
@@ -27,14 +27,17 @@ pub enum Sum {
     WallContacts = 16,
     /// Normal force on each of the six walls \[N\], from here.
     WallForce = 17,
+    /// The contacts' shares of the ledger in the step that led here, in the order of [`CONTACT_LEDGER`] \[J\]; zero
+    /// without a ledger. The particles' ledgers get them when the next step evaluates the contacts.
+    LastStep = 23,
 }
 
 /// Number of exact sums.
-pub const SUMS: usize = 23;
+pub const SUMS: usize = 23 + CONTACT_LEDGER.len();
 
-/// Ledger entries that a contact writes: work of the cell, work of driven partners and walls, damping,
-/// viscous, friction, plastic \[J\].
-pub const CONTACT_LEDGER: usize = 6;
+/// Entries of a particle's ledger ([`crate::state::LEDGER`]) into which its contacts write, in their order: work of the
+/// cell, work of driven partners and walls, damping, viscous, friction, plastic \[J\].
+pub const CONTACT_LEDGER: [usize; 6] = [0, 2, 3, 4, 5, 6];
 
 /// One touching contact as observed.
 #[derive(Debug, Clone, Copy)]
@@ -174,6 +177,15 @@ impl Observed<'_> {
         }
     }
 
+    /// Take in what the present contact puts into the ledger in this step.
+    pub fn take_last_step(&mut self, first: usize, entries: [f64; CONTACT_LEDGER.len()]) {
+        if self.wanted.sums && first < self.owned {
+            for (k, entry) in entries.into_iter().enumerate() {
+                self.observation.sums[Sum::LastStep as usize + k].add(entry);
+            }
+        }
+    }
+
     /// Take in the present contact, in this lane of a block; `first` is the local index of its first particle.
     /// `ellipsoids`: there are some; `lasts`: the normal law's memory outlives the contact.
     pub fn take(
@@ -193,7 +205,7 @@ impl Observed<'_> {
         }
         self.observation.raise(response.stiffness, touches.overlap_ratio(lane));
         let touch = touches.touch::<f64, true>(lane);
-        let force = sub(response.tangential_force, scale(touch.normal, response.normal_force));
+        let force = touches.force_on_first(lane);
         if let Some(place) = self.forces.get_mut(self.line - self.first_line) {
             *place = [force[0], force[1], force[2], 1.0];
         }

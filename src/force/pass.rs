@@ -48,6 +48,9 @@ pub struct PassInput<'a> {
     pub max_overlap_fraction: f64,
     /// Time since the last evaluation \[s\].
     pub time_step: f64,
+    /// Time for which the work of what the cell and walls impose counts, by the trapezoidal rule: half of the time since
+    /// the last evaluation and half of that to the next one, if there is one \[s\].
+    pub work_time: f64,
     /// Instructions to use.
     pub simd: Simd,
 }
@@ -250,10 +253,10 @@ impl PairPass {
         }
         let detailed = input.ledger || ellipsoids;
         let far = is_far(records);
-        let PassInput { stride, ledger, time_step, .. } = *input;
+        let PassInput { stride, ledger, work_time, .. } = *input;
         let rolling = self.rolling.is_some();
         let content = Content { rolling, detailed, range: self.range() };
-        let form = LineForm { stride, ledger, time_step, bodies: kind, rolling, walls };
+        let form = LineForm { stride, ledger, work_time, bodies: kind, rolling, walls };
         let mut output = Output { lines, form };
         let mut answer = |blocks: Range<usize>, touches: &mut [BlockTouches], memory: &mut [CacheLine]| {
             if far {
@@ -310,10 +313,10 @@ impl PairPass {
         let (kind, lasts) = (self.bodies.of_any_radius(), self.laws.lasts());
         let ellipsoids = kind == Bodies::Ellipsoids;
         let walls = section.partners == Partners::Wall;
-        let PassInput { stride, time_step, .. } = *input;
+        let PassInput { stride, work_time, .. } = *input;
         let rolling = self.rolling.is_some();
         let content = Content { rolling, detailed: true, range: self.range() };
-        let form = LineForm { stride, ledger: false, time_step, bodies: kind, rolling, walls };
+        let form = LineForm { stride, ledger: false, work_time, bodies: kind, rolling, walls };
         let nowhere = LineRing { values: &mut [], first: 0, mask: 0 };
         let mut output = Output { lines: nowhere, form };
         let (line, single) = (observed.line, observed.single());
@@ -336,8 +339,12 @@ impl PairPass {
             for place in batch.start * BLOCK..(batch.end * BLOCK).min(section.count) {
                 observed.line = line + place - blocks.start * BLOCK;
                 let wall = walls.then(|| section.wall_of(place));
-                let touches = &answered.touches[place / BLOCK - batch.start];
-                observed.take(touches, place % BLOCK, section.first_of(place), wall, (ellipsoids, lasts));
+                let (touches, lane) = (&answered.touches[place / BLOCK - batch.start], place % BLOCK);
+                let (first, force) = (section.first_of(place), touches.force_on_first(lane));
+                if input.ledger {
+                    observed.take_last_step(first, form.ledger_entries(&force, touches, lane));
+                }
+                observed.take(touches, lane, first, wall, (ellipsoids, lasts));
             }
         }
     }

@@ -4,7 +4,7 @@ use super::composition::RollingVisitor;
 use super::lane::{Lane, add, dot, scale, sub};
 use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
-use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, step_loss, stiffness_loss};
+use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss};
 use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
@@ -123,7 +123,7 @@ impl RollingLaw for SpringSlider {
 
     #[inline(always)]
     fn evaluate<L: Lane>(&self, touch: &Touch<L>, normal: &NormalResponse<L>, memory: &mut [L]) -> VectorResponse<L> {
-        let (half, one) = (L::splat(0.5), L::splat(1.0));
+        let half = L::splat(0.5);
         let step = L::splat(self.time_step);
         let (full, share) = (self.velocities == Velocities::FullStep, self.velocities.share_before());
         let (before, ahead) = (L::splat(share * self.time_step), L::splat((1.0 - share) * self.time_step));
@@ -151,7 +151,7 @@ impl RollingLaw for SpringSlider {
         [memory[0], memory[1], memory[2]] = add(spring, scale(roll_rate, ahead * stiffness));
         energies.elastic = half * dot(spring, spring) / stiffness;
         let slid = if full {
-            share * (one - share) * dot(trial, trial) / stiffness
+            slip_loss(trial, share, scale(roll_rate, before), stiffness)
         } else {
             step_loss(carried, kept_share(a, last), spring, scale(roll_rate, step), stiffness)
         };
@@ -174,10 +174,10 @@ impl RollingLaw for SpringSlider {
         memory[3] = spring + twist_rate * ahead * stiffness;
         memory[4] = a;
         energies.elastic = energies.elastic + half * spring * spring / stiffness;
+        let alone = |value: L| [value, L::splat(0.0), L::splat(0.0)];
         let slid = if full {
-            share * (one - share) * trial * trial / stiffness
+            slip_loss(alone(trial), share, alone(twist_rate * before), stiffness)
         } else {
-            let alone = |value: L| [value, L::splat(0.0), L::splat(0.0)];
             step_loss(alone(carried), kept, alone(spring), alone(twist_rate * step), stiffness)
         };
         energies.friction =

@@ -144,6 +144,16 @@ pub fn stiffness_loss<L: Lane>(before: L, last: L, after: L, stiffness: L) -> L 
     loss.only(last.greater(zero))
 }
 
+/// Energy that sliding takes from a spring of which only a `share` s of the force f is carried, f having grown by `slip` d, half
+/// of the step's: what the spring holds less than f would, `½ (1 − s²) f²/k`, less the work that is not done for it,
+/// `(1 − s) f·d`.
+#[inline(always)]
+#[must_use]
+pub fn slip_loss<L: Lane>(force: Vector<L>, share: L, slip: Vector<L>, stiffness: L) -> L {
+    let (half, one) = (L::splat(0.5), L::splat(1.0));
+    (one - share) * (half * (one + share) * dot(force, force) / stiffness - dot(force, slip))
+}
+
 /// Energy that a spring with its slider dissipates in a step along `slip`, with the velocities of the half step: the work of the
 /// mean of the forces before and after, and what the spring held before, less what it holds after. `carried` is the force
 /// before, turned, and shrunk by the factor `shrinkage` ≤ 1 that [`kept_share`] gives.

@@ -47,7 +47,8 @@ const FORMED: f64 = 8.0 / 15.0 - 4.0 / 3.0 + 0.5;
 /// `a = a_s y²`:
 ///
 /// - JKR: `δ = δ_s (y⁴ − y)`, `F = F_s (4/3 y⁶ − 2 y³)`; pull-off force `3/2 π Γ R_eff`;
-/// - first yield where `2 y² − 1/y = π p_y R_eff/(E_eff a_s)`;
+/// - first yield where `2 y² − 1/y = π p_y R_eff/(E_eff a_s)`, but not before the surfaces meet at y = 1: where the right
+///   side is below 1, adhesion alone makes them yield from there on;
 /// - plastic loading: `F = F_y + π p_y (a² − a_y²) − 2/3 √(2 π Γ E_eff) (a^{3/2} − a_y^{3/2})`, the integral of
 ///   Thornton and Ning's stiffness; δ(a) stays JKR's;
 /// - unloading from the largest overlap δ* (radius a*, force F*): JKR with
@@ -153,20 +154,32 @@ fn plastic_loading<L: Lane>(y: L, yield_y: L, kappa: L) -> [L; 2] {
     [force, work]
 }
 
-/// Warns where `memory_range` breaks the necks of the smallest particles before they reach pull-off, of spheres of equal
-/// size at the gap `(27/256)^{1/3} a_s²/R_eff`.
+/// Warns of two things in the smallest particles, spheres of equal size: necks that `memory_range` breaks before they
+/// reach pull-off, at the gap `(27/256)^{1/3} a_s²/R_eff`; and surfaces that yield as they meet, `π p_y R_eff/(E_eff a_s)`
+/// below 1.
 #[must_use]
-pub fn caution(pair: &PairConfig, smallest: f64) -> Option<String> {
+pub fn cautions(pair: &PairConfig, smallest: f64) -> Vec<String> {
     let law = ThorntonNing::new(pair);
-    let scale = libm::cbrt(4.0 * std::f64::consts::PI * law.surface_energy / (law.effective_modulus * smallest));
+    let pi = std::f64::consts::PI;
+    // a_s/R_eff.
+    let scale = libm::cbrt(4.0 * pi * law.surface_energy / (law.effective_modulus * smallest));
     let needed = libm::cbrt(27.0 / 256.0) * scale * scale;
-    (needed > law.range).then(|| {
+    let yielding = pi * law.pressure / (law.effective_modulus * scale);
+    let breaks = (needed > law.range).then(|| {
         format!(
             "thornton_ning: necks between particles of {smallest:.3e} m reach to a gap of {needed:.3} R_eff, and \
              memory_range {} breaks them before: raise it",
             law.range
         )
-    })
+    });
+    let yields = (yielding < 1.0).then(|| {
+        format!(
+            "thornton_ning: between particles of {smallest:.3e} m adhesion alone exceeds the yield pressure as they meet \
+             (pi p_y R_eff/(E_eff a_s) = {yielding:.3}, below 1): the law then yields from the first touch on, beyond what \
+             it was made for; raise yield_stress, or lower surface_energy"
+        )
+    });
+    breaks.into_iter().chain(yields).collect()
 }
 
 /// Hands the law of a pair to the visitor.
@@ -208,13 +221,12 @@ impl NormalLaw for ThorntonNing {
         let largest = memory[0].max(touch.overlap);
         let top = largest * per_factor;
         let kappa = L::splat(pi * self.pressure / (2.0 * self.effective_modulus)) * radius / radius_scale;
-        let yield_y = first_yield(kappa);
+        // A contact forms at y = 1, possibly beyond first yield: then it yields from there on.
+        let yield_y = one.max(first_yield(kappa));
         let top_y = neck(top / overlap_scale);
         let yielded = top_y.greater(yield_y);
         let [plastic_force, plastic_work] = plastic_loading(top_y, yield_y, kappa);
-        // A contact forms at y = 1, possibly beyond yield already.
-        let begin = one.max(yield_y);
-        let work = energy(begin) + plastic_work - plastic_loading(begin, yield_y, kappa)[1];
+        let work = energy(yield_y) + plastic_work - plastic_loading(yield_y, yield_y, kappa)[1];
 
         // The branch of unloading: its radius, and its scales over those of the first.
         let cube = top_y * top_y * top_y;

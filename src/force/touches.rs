@@ -4,7 +4,7 @@
 //! once, whatever the number of laws.
 
 use super::geometry::{PairTouch, Relative};
-use super::lane::{Lane, Vector};
+use super::lane::{Lane, Vector, scale, sub};
 use super::law::{ContactResponse, Energies, MAX_EARLY, NormalResponse, Touch, VectorResponse};
 use crate::contact::section::{BLOCK, CacheLine};
 use bytemuck::Zeroable;
@@ -355,6 +355,13 @@ impl BlockTouches {
             stiffness: self.stiffness.one(0, lane),
             energies: normal.energies,
         }
+    }
+
+    /// Force of one contact on the first \[N\].
+    #[must_use]
+    pub fn force_on_first(&self, lane: usize) -> Vector<f64> {
+        let response = self.response::<f64>(lane);
+        sub(response.tangential_force, scale(self.touch::<f64, true>(lane).normal, response.normal_force))
     }
 
     /// The branch vector of one contact \[m\].

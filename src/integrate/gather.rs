@@ -65,12 +65,9 @@ impl Lines<'_> {
     /// Add what the contacts of which this particle has the lower id put into its ledger; after the sums.
     #[inline(always)]
     pub fn add_ledger(&self, ends: &[End], ledger: &mut [f64]) {
-        // Contact entries: cell, driven, damping, viscous, friction, plastic; the particle's ledger has
-        // the work of body forces between the first two.
-        const TO: [usize; CONTACT_LEDGER] = [0, 2, 3, 4, 5, 6];
         for end in ends.iter().filter(|end| !end.is_second()) {
-            let entries = &self.buffer[end.place::<false>() + self.width..][..CONTACT_LEDGER];
-            for (value, to) in entries.iter().zip(TO) {
+            let entries = &self.buffer[end.place::<false>() + self.width..][..CONTACT_LEDGER.len()];
+            for (value, to) in entries.iter().zip(CONTACT_LEDGER) {
                 ledger[to] += value;
             }
         }

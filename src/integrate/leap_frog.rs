@@ -423,7 +423,8 @@ fn turn_free<W: Lane, const HALF: bool>(slice: &mut Slice, index: usize, loads: 
     W::scatter([seen[0], seen[1], seen[2], record[11]], records, RECORD, 8);
 }
 
-/// Work of gravity and of what drives a driven particle, `F·v Δt` at the full step.
+/// Work of gravity and of what drives a driven particle, `F·v` at the full step times half of the steps before and after
+/// it (trapezoidal rule). What the first half adds to a state is in [`crate::simulation::Report`] before it is here.
 #[inline(always)]
 fn add_external_work(
     ledger: &mut [f64; LEDGER.len()],
@@ -433,11 +434,12 @@ fn add_external_work(
     motion: &StepMotion,
 ) {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let time = 0.5 * (motion.previous_time_step + motion.time_step);
     if record.inverse_mass > 0.0 {
-        ledger[1] += dot(motion.gravity, velocity) / record.inverse_mass * motion.time_step;
+        ledger[1] += dot(motion.gravity, velocity) / record.inverse_mass * time;
     } else {
         let (force, torque) = ([load[0], load[1], load[2]], [load[4], load[5], load[6]]);
-        ledger[2] -= (dot(force, velocity) + dot(torque, record.spin)) * motion.time_step;
+        ledger[2] -= (dot(force, velocity) + dot(torque, record.spin)) * time;
     }
 }
 

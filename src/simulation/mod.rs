@@ -1,6 +1,7 @@
 //! The simulation of one rank: all state and the step that moves it, in the order of ARCHITECTURE.md.
 //! Only this module and `setup` see all stages.
 
+pub mod affine;
 mod fault;
 mod lists;
 mod relaxation;
@@ -346,13 +347,15 @@ impl Simulation {
         }
     }
 
-    fn pass_input<'a>(&self, motion: &'a CellMotion) -> PassInput<'a> {
+    /// `next`: the time to the next evaluation, 0 if nothing is to move now \[s\].
+    fn pass_input<'a>(&self, motion: &'a CellMotion, next: f64) -> PassInput<'a> {
         PassInput {
             motion,
             stride: self.lines.stride,
             ledger: self.model.config.output.energy_ledger,
             max_overlap_fraction: self.model.config.max_overlap_fraction,
             time_step: self.global.previous_time_step,
+            work_time: 0.5 * (self.global.previous_time_step + next),
             simd: self.model.simd,
         }
     }
@@ -362,7 +365,7 @@ impl Simulation {
         self.timers.start(Stage::Observe);
         let motion = self.cell_motion();
         let passes = self.model.passes_in_force(self.is_quasi_static());
-        let phase = Phase { passes, input: self.pass_input(&motion) };
+        let phase = Phase { passes, input: self.pass_input(&motion, 0.0) };
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
         let particles = &self.particles;
@@ -375,7 +378,7 @@ impl Simulation {
     /// ghosts are up to date.
     fn move_on(&mut self, plan: &StepPlan, motion: &StepMotion, fresh: bool) -> (StepResult, Option<PassFault>) {
         let cell = self.cell_motion();
-        let input = self.pass_input(&cell);
+        let input = self.pass_input(&cell, plan.time_step);
         let relaxed = self.is_quasi_static();
         if self.contacts.strips.len() > 1 {
             workers::keep_awake();
@@ -421,6 +424,7 @@ impl Simulation {
         for (particle, wraps) in &result.wrapped {
             self.contacts.apply_wrap(*particle as usize, *wraps);
         }
+        self.account_for_crossings(&result.wrapped, motion.face_velocity);
         self.global.step += 1;
         self.global.time = plan.next_time;
         self.global.previous_time_step = plan.time_step;

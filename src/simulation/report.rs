@@ -1,10 +1,11 @@
 //! Homogenisation: from the observation of one state to the numbers that the history shows.
 
+use super::affine::affine_energy;
 use super::{Simulation, Stage};
 use crate::error::Result;
 use crate::exchange::ExactSum;
 use crate::exchange::exact_sum;
-use crate::force::observe::{Observation, SUMS, Sample, Sum, Wanted};
+use crate::force::observe::{CONTACT_LEDGER, Observation, SUMS, Sample, Sum, Wanted};
 use crate::integrate::time_step::Measured;
 use crate::output::history::HistoryRow;
 use crate::state::LEDGER;
@@ -68,6 +69,10 @@ impl Simulation {
         let bearing = particles - values[ParticleSum::Rattlers as usize];
         let free = values[ParticleSum::Free as usize];
         let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
+        let mut ledger = std::array::from_fn(|k| values[ParticleSum::Ledger as usize + k]);
+        for (k, entry) in CONTACT_LEDGER.into_iter().enumerate() {
+            ledger[entry] += values[Sum::LastStep as usize + k];
+        }
         let row = HistoryRow {
             step: self.global.step,
             time: self.global.time,
@@ -87,7 +92,7 @@ impl Simulation {
             kinetic: values[ParticleSum::Kinetic as usize],
             elastic: values[Sum::Elastic as usize],
             viscoelastic: values[Sum::Viscoelastic as usize],
-            ledger: std::array::from_fn(|k| values[ParticleSum::Ledger as usize + k]),
+            ledger,
             unbalanced_ratio: (values[ParticleSum::NetForce as usize] / free)
                 / (values[Sum::ForceMagnitude as usize] / (contacts + wall_contacts)),
             max_overlap_ratio: largest[1],
@@ -117,7 +122,8 @@ impl Simulation {
             let [_, (velocity, spin)] = self.particles.velocities(index);
             let dot = |a: [f64; 3]| a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
             // Peculiar velocity: relative to the affine flow of the cell.
-            let velocity = [0, 1, 2].map(|k| velocity[k] - gradient[k] * record.position[k]);
+            let absolute = velocity;
+            let velocity = [0, 1, 2].map(|k| absolute[k] - gradient[k] * record.position[k]);
             let squared = dot(velocity);
             if record.inverse_mass > 0.0 && squared > max_speed {
                 max_speed = squared;
@@ -143,8 +149,14 @@ impl Simulation {
                 sums[ParticleSum::Rattlers as usize].add(1.0);
                 sums[ParticleSum::RattlerContacts as usize].add(f64::from(touching));
             }
-            for (k, value) in self.particles.ledger.get(index).into_iter().flatten().enumerate() {
-                sums[ParticleSum::Ledger as usize + k].add(*value);
+            if let Some(ledger) = self.particles.ledger.get(index) {
+                let mut add = |entry: usize, value| sums[ParticleSum::Ledger as usize + entry].add(value);
+                for (k, value) in ledger.iter().enumerate() {
+                    add(k, *value);
+                }
+                add(0, -affine_energy(mass, absolute, record.position, gradient));
+                let (entry, work) = self.latest_work(index, absolute);
+                add(entry, work);
             }
         }
         max_speed.sqrt()
@@ -164,12 +176,17 @@ impl Simulation {
         rate * (2.0 * self.model.max_radius) * (density / pressure).sqrt()
     }
 
-    /// L̇/L where velocities are absolute (BC), zero where they are peculiar (BCT).
-    pub(super) fn peculiar_gradient(&self) -> [f64; 3] {
-        let motion = self.cell_motion();
-        // BC carries the cell's motion in the shift velocity: one image per side length.
-        let per_image = motion.wall_velocity;
-        [0, 1, 2].map(|k| per_image[k] / motion.sides[k])
+    /// Which entry of a particle's ledger lacks what work \[J\]: of gravity or of what drives it, by the half of the last step
+    /// that the trapezoidal rule gives to the present state. What turns a driven particle is not known here.
+    fn latest_work(&self, index: usize, velocity: [f64; 3]) -> (usize, f64) {
+        let half = 0.5 * self.global.previous_time_step;
+        let power = |force: [f64; 3]| force[0] * velocity[0] + force[1] * velocity[1] + force[2] * velocity[2];
+        if self.particles.record[index].inverse_mass > 0.0 {
+            let mass = self.mass(index);
+            (1, power(self.model.config.gravity.map(|g| mass * g)) * half)
+        } else {
+            (2, -power(self.contact_force(index)) * half)
+        }
     }
 
     /// Number of touching contacts of an owned particle at the last look at single contacts.
@@ -177,15 +194,20 @@ impl Simulation {
         self.contacts.lines_of(particle).filter(|(line, _)| self.forces[*line][3] > 0.0).count() as u32
     }
 
-    fn mass(&self, particle: usize) -> f64 {
+    pub(super) fn mass(&self, particle: usize) -> f64 {
         let species = self.model.species[self.particles.species[particle] as usize];
         ellipsoid_mass(self.particles.semi_axes(particle), species.density)
     }
 
     /// Sum of all forces on an owned particle at the last look at single contacts \[N\].
     fn net_force(&self, particle: usize) -> [f64; 3] {
-        let mass = self.mass(particle);
-        let mut sum = self.model.config.gravity.map(|g| mass * g);
+        let (mass, contact) = (self.mass(particle), self.contact_force(particle));
+        std::array::from_fn(|k| mass * self.model.config.gravity[k] + contact[k])
+    }
+
+    /// Sum of its contact forces \[N\].
+    fn contact_force(&self, particle: usize) -> [f64; 3] {
+        let mut sum = [0.0; 3];
         for (line, is_second) in self.contacts.lines_of(particle) {
             let sign = if is_second { -1.0 } else { 1.0 };
             for (total, force) in sum.iter_mut().zip(self.forces[line]) {

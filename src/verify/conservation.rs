@@ -19,8 +19,25 @@ fn draw(counter: u64) -> f64 {
 const GAS_RADIUS: f64 = 1e-3;
 const GAS_DENSITY: f64 = 2500.0;
 
+/// A gas and what its cell does.
+#[derive(Clone, Copy)]
+struct Gas {
+    restitution: f64,
+    friction: f64,
+    /// Stages.
+    load: &'static str,
+    /// The faces of the cell move, not the particles with it (BC).
+    faces_move: bool,
+}
+
+const RESTING: &str = "[[stage]]\nhold = true\nduration = 5e-3\n";
+/// The cell changes its shape, with a jump of its rates on the way.
+const DEFORMING: &str = "[[stage]]\nstrain_rate = [40, 10, -20]\nduration = 3e-3\n\
+                      [[stage]]\nstrain_rate = [-20, 0, 30]\nduration = 2e-3\n";
+
 /// 36 spheres of two sizes on a loose grid, with random velocities and spins.
-fn gas_scene(time_step: f64, restitution: f64, friction: f64) -> Scene {
+fn gas_scene(time_step: f64, Gas { restitution, friction, load, faces_move }: Gas) -> Scene {
+    let kinematics = if faces_move { "BC" } else { "BCT" };
     let spacing = 2.4 * GAS_RADIUS;
     let spheres = (0..36_u64).map(|k| {
         let number = |component: u64| draw(16 * k + component);
@@ -40,7 +57,7 @@ fn gas_scene(time_step: f64, restitution: f64, friction: f64) -> Scene {
         ),
         sections: format!(
             "[contact.normal.hertz]\n[contact.tangential.mindlin]\n[time_step]\nfixed = {time_step:e}\n\
-             [[stage]]\nhold = true\nduration = 5e-3\n[output]\nenergy_ledger = true\n"
+             [load]\nkinematics = \"{kinematics}\"\n{load}[output]\nenergy_ledger = true\n"
         ),
         spheres: spheres.collect(),
         ..Scene::default()
@@ -71,26 +88,29 @@ fn balance(row: &HistoryRow) -> f64 {
 struct GasRun {
     /// Largest change of momentum over the sum of magnitudes.
     momentum_drift: f64,
-    /// Change of the energy balance over the initial kinetic energy.
+    /// Change of the energy balance to the end over the initial kinetic energy.
     energy_error: f64,
+    /// The largest on the way.
+    worst_error: f64,
 }
 
-fn gas_run(time_step: f64, restitution: f64, friction: f64) -> Result<GasRun> {
-    let mut simulation = gas_scene(time_step, restitution, friction).start()?;
+fn gas_run(time_step: f64, gas: Gas) -> Result<GasRun> {
+    let mut simulation = gas_scene(time_step, gas).start()?;
     let (before, magnitude) = momentum(&states(&mut simulation)?);
-    let mut ends: Vec<HistoryRow> = Vec::new();
+    let mut rows: Vec<HistoryRow> = Vec::new();
     drive(
         &mut simulation,
-        |global| Wanted { sums: global.step == 0 || global.stage > 0, ..Wanted::default() },
+        |global| Wanted { sums: global.step % 500 == 0, ..Wanted::default() },
         |_, report| {
-            ends.push(report.row);
+            rows.push(report.row);
             Ok(())
         },
     )?;
     let (after, _) = momentum(&states(&mut simulation)?);
     let momentum_drift = (0..3).map(|k| (after[k] - before[k]).abs()).fold(0.0, f64::max) / magnitude;
-    let (first, last) = (&ends[0], &ends[ends.len() - 1]);
-    Ok(GasRun { momentum_drift, energy_error: (balance(last) - balance(first)) / first.kinetic })
+    let errors = rows.iter().map(|row| (balance(row) - balance(&rows[0])) / rows[0].kinetic);
+    let worst_error = errors.clone().map(f64::abs).fold(0.0, f64::max);
+    Ok(GasRun { momentum_drift, energy_error: errors.last().unwrap_or(f64::NAN), worst_error })
 }
 
 /// Time step of the gas \[s\]: a contact lasts some 900 of them.
@@ -99,15 +119,28 @@ const STEP: f64 = 1e-7;
 /// A periodic gas over several collisions of each sphere.
 pub fn gas() -> Result<Vec<Claim>> {
     let mut claims = Vec::new();
-    for (name, restitution, friction, bound) in
-        [("elastic", 1.0, 0.0, 1e-6), ("frictional", 1.0, 0.5, 1e-5), ("damped", 0.7, 0.5, 1e-4)]
-    {
-        let fine = gas_run(STEP, restitution, friction)?;
-        claims.push(Claim::bounded(format!("{name}: relative drift of momentum"), 1e-12, fine.momentum_drift));
-        claims.push(Claim::bounded(format!("{name}: energy balance over kinetic energy"), bound, fine.energy_error));
-        if friction == 0.0 {
-            // With friction the balance was seen to converge at first order only, so there the bound alone stands.
-            let finer = gas_run(0.5 * STEP, restitution, friction)?;
+    for (name, gas, bound) in [
+        ("elastic", Gas { restitution: 1.0, friction: 0.0, load: RESTING, faces_move: false }, 5e-6),
+        ("frictional", Gas { restitution: 1.0, friction: 0.5, load: RESTING, faces_move: false }, 1e-5),
+        ("damped", Gas { restitution: 0.7, friction: 0.5, load: RESTING, faces_move: false }, 1e-4),
+        ("elastic, BCT", Gas { restitution: 1.0, friction: 0.0, load: DEFORMING, faces_move: false }, 5e-6),
+        ("elastic, BC", Gas { restitution: 1.0, friction: 0.0, load: DEFORMING, faces_move: true }, 5e-6),
+        ("damped, BC", Gas { restitution: 0.7, friction: 0.5, load: DEFORMING, faces_move: true }, 1e-4),
+    ] {
+        let fine = gas_run(STEP, gas)?;
+        if !gas.faces_move {
+            claims.push(Claim::bounded(format!("{name}: relative drift of momentum"), 1e-12, fine.momentum_drift));
+        }
+        claims.push(Claim::bounded(
+            format!("{name}: worst energy balance over kinetic energy"),
+            bound,
+            fine.worst_error,
+        ));
+        let finer = gas_run(0.5 * STEP, gas)?;
+        // Sliding and the clipped ends of damped contacts make it first order.
+        let share = finer.worst_error / fine.worst_error;
+        claims.push(Claim::bounded(format!("{name}: worst at half the step over that"), 0.6, share));
+        if name == "elastic" {
             let ratio = fine.energy_error / finer.energy_error;
             claims.push(Claim::relative(format!("{name}: error over that at half the step"), 4.0, ratio, 0.05));
         }

@@ -50,8 +50,8 @@ pub struct LineForm {
     pub stride: usize,
     /// Write the ledger's numbers.
     pub ledger: bool,
-    /// Time since the last evaluation \[s\].
-    pub time_step: f64,
+    /// As [`super::PassInput::work_time`] \[s\].
+    pub work_time: f64,
     /// What the bodies are; at walls not [`Bodies::EqualSpheres`], as the arms of both differ.
     pub bodies: Bodies,
     /// There is a rolling law.
@@ -159,17 +159,25 @@ impl LineForm {
         force
     }
 
+    /// What contacts with these forces on the firsts \[N\] put into the ledger in this step, in the order of
+    /// [`crate::force::observe::CONTACT_LEDGER`] \[J\].
     #[inline(always)]
-    fn write_ledger<L: Lane>(&self, rows: &mut [f64], force: &Vector<L>, touches: &BlockTouches, lane: usize) {
+    pub fn ledger_entries<L: Lane>(&self, force: &Vector<L>, touches: &BlockTouches, lane: usize) -> [L; 6] {
         let zero = L::splat(0.0);
         let alive = touches.alive::<L>(lane);
-        // The cell puts in −F_second · v_imposed Δt; at a moving wall the same work is the wall's.
-        let work = dot(*force, touches.imposed_velocity(lane)) * L::splat(self.time_step);
+        // The cell puts in −F_second · v_imposed per time; at a moving wall the same work is the wall's.
+        let work = dot(*force, touches.imposed_velocity(lane)) * L::splat(self.work_time);
         let work = work.only(alive);
         let (cell, driven) = if self.walls { (zero, work) } else { (work, zero) };
         let e = touches.response::<L>(lane).energies;
         let [damping, viscous, friction] = only(alive, [e.damping, e.viscous, e.friction]);
-        let plastic = e.plastic.only(alive);
+        [cell, driven, damping, viscous, friction, e.plastic.only(alive)]
+    }
+
+    #[inline(always)]
+    fn write_ledger<L: Lane>(&self, rows: &mut [f64], force: &Vector<L>, touches: &BlockTouches, lane: usize) {
+        let zero = L::splat(0.0);
+        let [cell, driven, damping, viscous, friction, plastic] = self.ledger_entries(force, touches, lane);
         let (stride, own) = (self.stride, self.width());
         L::scatter([cell, driven, damping, viscous], rows, stride, own);
         L::scatter([friction, plastic, zero, zero], rows, stride, own + 4);

@@ -53,7 +53,8 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> Left {
         wall_velocity: [0.0; 3],
     };
     let stride = pass.width() + if ledger { LEDGER_STRIDE } else { 0 };
-    let input = PassInput { motion: &motion, stride, ledger, max_overlap_fraction: 0.5, time_step, simd };
+    let input =
+        PassInput { motion: &motion, stride, ledger, max_overlap_fraction: 0.5, time_step, work_time: time_step, simd };
     let mut records = records();
     let mut lines = vec![0.0; section.blocks() * BLOCK * stride];
     let mut touches: Box<[BlockTouches; BATCH]> = bytemuck::zeroed_box();

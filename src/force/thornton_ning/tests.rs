@@ -209,15 +209,47 @@ fn a_pair_without_surface_energy_is_refused_and_a_nan_is_not_hidden() {
     assert!(law.evaluate(&touch(f64::NAN, 0.0, RADIUS, MASS), &mut memory).force.is_nan());
 }
 
+/// With a yield pressure that adhesion alone exceeds where the surfaces meet.
+#[test]
+fn surfaces_that_adhesion_makes_yield_meet_like_others_and_lose_nothing_before() {
+    let scale = libm::cbrt(2.0 * PI * ENERGY * RADIUS * RADIUS / modulus());
+    let kappa = |yield_stress: f64| PI * 1.6 * yield_stress * RADIUS / (2.0 * modulus() * scale);
+    for yield_stress in [2e6, 5e6, 1e7] {
+        assert!(kappa(yield_stress) < 0.5, "{}", kappa(yield_stress));
+        let law = law(ENERGY, yield_stress);
+        let mut memory = [0.0; 5];
+        let mut at = |overlap: f64| law.evaluate(&touch(overlap, 0.0, RADIUS, MASS), &mut memory);
+        let before = at(-1e-9);
+        assert_eq!((before.force, before.contact_radius, sum(&before.energies)), (0.0, 0.0, 0.0));
+        let formed = at(0.0);
+        assert!((formed.force / (-4.0 / 3.0 * PI * ENERGY * RADIUS) - 1.0).abs() < 1e-12, "{}", formed.force);
+        assert!(sum(&formed.energies).abs() < 1e-12 * ENERGY * RADIUS * RADIUS);
+        assert!((at(1e-14).contact_radius / scale - 1.0).abs() < 1e-3);
+        assert!(law.evaluate(&touch(1e-3 * RADIUS, 0.0, RADIUS, MASS), &mut [0.0; 5]).stiffness > 0.0);
+        for speed in [0.5, 2.0] {
+            let (_, error) = hit(&law, speed, 1e-10);
+            let (_, finer) = hit(&law, speed, 2.5e-11);
+            assert!(error < 0.01 && finer < 0.5 * error, "{yield_stress}, {speed}: {error} {finer}");
+        }
+    }
+}
+
 #[test]
 fn necks_that_outreach_the_memory_range_are_warned_of() {
     let warning = |range: &str| {
         let law = choice(Role::Normal, "thornton_ning", &[("memory_range", range)]);
-        caution(&pair(constants(ENERGY, NEVER), law), 2.0 * RADIUS)
+        cautions(&pair(constants(ENERGY, NEVER), law), 2.0 * RADIUS).pop()
     };
     assert!(warning("0.001").unwrap().contains("memory_range 0.001"));
     let scale = libm::cbrt(2.0 * PI * ENERGY / (modulus() * RADIUS));
     let needed = 0.472_470_4 * scale * scale;
     assert!(warning(&format!("{}", 1.0001 * needed)).is_none());
     assert!(warning(&format!("{}", 0.9999 * needed)).is_some());
+    let of_yield = |yield_stress: f64| {
+        let law = choice(Role::Normal, "thornton_ning", &[("memory_range", "0.5")]);
+        cautions(&pair(constants(ENERGY, yield_stress), law), 2.0 * RADIUS)
+    };
+    let least = modulus() * scale / (PI * 1.6);
+    assert!(of_yield(1.0001 * least).is_empty());
+    assert!(of_yield(0.9999 * least)[0].contains("yield_stress"));
 }
