@@ -38,11 +38,15 @@ impl LoadProgramme {
         self.stages.get(global.stage)
     }
 
-    /// Enter the next stage while the current one is over. Returns true when the run is over.
-    pub fn settle(&self, global: &mut GlobalState) -> bool {
+    /// Enter the next stage while the current one is over. Returns true when the run is over. Adds to `skipped` the
+    /// stages that were over when they began.
+    pub fn settle(&self, global: &mut GlobalState, skipped: &mut Vec<usize>) -> bool {
         while let Some(stage) = self.stage(global) {
             if !is_over(stage, global) {
                 return false;
+            }
+            if global.step == global.stage_start_step {
+                skipped.push(global.stage);
             }
             global.stage += 1;
             global.stage_start_time = global.time;

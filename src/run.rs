@@ -15,7 +15,7 @@ use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
-use output::{RunOutput, is_due};
+use output::{DYNAMIC_HISTORY, RunOutput, is_due};
 use signals::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -67,16 +67,18 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     }
     // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
     let initial = setup::onto_first(comm, ranks, initial)?;
+    signals.heed();
     let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
-    let prepared =
-        if active.rank() == 0 { prepare(config, checkpoint.as_deref(), initial.global.step) } else { Ok(()) };
-    agree(&active, prepared)?;
-    let (simulation, report) = setup::timed_simulation(active, config, decomposition, initial, threads)?;
+    let (mut simulation, report) = setup::timed_simulation(active, config, decomposition, initial, threads)?;
+    simulation.check_fixed_time_step()?;
     efforts.report(&report);
     if let Some(worst) = report.overlap.filter(|_| simulation.comm().rank() == 0) {
         let ([low, high], fraction) = (worst.ids, worst.fraction);
         say!("packing: largest overlap {fraction:.1e} of the smaller radius (particles {low} and {high})");
     }
+    // Only now that nothing speaks against the run does it touch what lies in its directory.
+    let prepared = if simulation.comm().rank() == 0 { prepare(config, checkpoint.as_deref()) } else { Ok(()) };
+    agree(simulation.comm(), prepared)?;
     Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }
 
@@ -120,12 +122,11 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
     Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
 }
 
-fn prepare(config: &Config, checkpoint: Option<&Path>, step: u64) -> Result<()> {
-    if let Some(file) = checkpoint {
-        output::check_directory(config, file)?;
-    }
-    output::prepare_directory(config, step)?;
-    checkpoint.map_or(Ok(()), |file| output::take_over(config, file))
+fn prepare(config: &Config, checkpoint: Option<&Path>) -> Result<()> {
+    let Some(file) = checkpoint else { return output::make_directory(config) };
+    output::check_directory(config, file)?;
+    output::make_directory(config)?;
+    output::take_over(config, file)
 }
 
 /// A run in progress on one rank.
@@ -143,6 +144,11 @@ impl Run {
     fn new(simulation: Simulation, config: Arc<Config>, signals: Signals, efforts: Efforts) -> Result<Self> {
         let output = RunOutput::new(&simulation, &config, efforts)?;
         let first_step = simulation.global().step;
+        let cleared = match simulation.comm().rank() {
+            0 => output::clear_future(&config, first_step),
+            _ => Ok(()),
+        };
+        agree(simulation.comm(), cleared)?;
         Ok(Self {
             simulation,
             config,
@@ -191,9 +197,10 @@ impl Run {
     /// the running one. `None`: the stage is over.
     fn substep(&mut self) -> Result<Option<Requests>> {
         let (before, increments) = (self.simulation.global().stage, self.increments());
+        let substeps = self.simulation.global().quasi_static.map_or(0, |state| state.substep);
         if let Some(mut report) = self.simulation.test_equilibrium()? {
             let over = self.simulation.settle_stage();
-            let wanted = self.wanted_at_equilibrium(self.increments() > increments);
+            let wanted = self.wanted_at_equilibrium(self.increments() > increments, substeps);
             // The last state of all is reported when the run ends.
             if !over && (wanted.sums || wanted.samples) {
                 if wanted.samples {
@@ -213,8 +220,9 @@ impl Run {
         self.simulation.global().quasi_static.map_or(0, |state| state.increments)
     }
 
-    /// What is due at a new equilibrium (`reached`), or else at the start of a stage: the first state of all.
-    fn wanted_at_equilibrium(&self, reached: bool) -> Wanted {
+    /// What is due at a new equilibrium (`reached`), so many substeps after the one before, or else at the start of a
+    /// stage: the first state of all.
+    fn wanted_at_equilibrium(&self, reached: bool, substeps: u64) -> Wanted {
         let (global, increments) = (self.simulation.global(), self.increments());
         let counted = |every: u64| increments.is_multiple_of(every);
         let history = match self.config.output.history {
@@ -224,7 +232,7 @@ impl Run {
         };
         let snapshot = match self.config.output.snapshots {
             Some(Interval::Increments(every)) => counted(every),
-            Some(every) => is_due(every, global, global.snapshots),
+            Some(every) => is_due(every, global, substeps),
             None => false,
         };
         Wanted {
@@ -233,12 +241,17 @@ impl Run {
         }
     }
 
-    /// What is due at the present state. Counting what is written keeps this the same after a restart.
+    /// What is due at the present state, but for what the equilibrium that ended a quasi-static stage here has written. What
+    /// the state says alone decides, so that it is the same after a restart.
     fn wanted(&self) -> Wanted {
         let global = self.simulation.global();
-        let history = is_due(self.config.output.history, global, global.history_rows);
-        let snapshot = self.config.output.snapshots.is_some_and(|every| is_due(every, global, global.snapshots));
-        Wanted { sums: history, samples: snapshot }
+        let history = match self.config.output.history {
+            Interval::Increments(_) => is_due(DYNAMIC_HISTORY, global, 1),
+            every => is_due(every, global, 1),
+        };
+        let snapshot = self.config.output.snapshots.is_some_and(|every| is_due(every, global, 1));
+        let [row, shown] = self.output.last_steps().map(|last| last == Some(global.step));
+        Wanted { sums: history && !row, samples: snapshot && !shown }
     }
 
     fn requests(&self) -> Requests {

@@ -1,5 +1,6 @@
 //! From the checked input to a simulation ready to step: model, decomposition, packing or checkpoint.
 
+mod begun;
 mod overlap;
 
 use crate::config::{
@@ -94,6 +95,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         measured_stress: [0.0; 3],
         particles: count,
         quasi_static: None,
+        previous_time: None,
     };
     programme(config).enter(&mut global);
     begin_ledgers(config, &global, &mut particles);
@@ -129,7 +131,8 @@ fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
 /// A checkpoint as initial state.
 ///
 /// # Errors
-/// The checkpoint belongs to another input (number of species or contact-memory width differ).
+/// The checkpoint belongs to another input (number of species or contact-memory width differ), or the input changes what
+/// no longer acts.
 pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initial> {
     let species = config.species.len() as u32;
     if let Some(particle) = checkpoint.particles.iter().find(|p| p.species >= species) {
@@ -139,7 +142,8 @@ pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initia
             particle.id, particle.species
         )));
     }
-    let Checkpoint { mut global, particles, memory, columns, .. } = checkpoint;
+    let Checkpoint { mut global, particles, memory, columns, config_resolved, .. } = checkpoint;
+    begun::check(&config_resolved, &config.resolved, &global)?;
     let programme = programme(config);
     // A stage that was added to a complete run has not been entered yet.
     if global.step == global.stage_start_step {

@@ -173,9 +173,15 @@ pub(super) fn read_stage(section: &Section, name: String, (until_strain, until_s
     })
 }
 
-/// Whether everything in the input has a meaning in quasi-static stages.
+/// Whether everything in the input has a meaning in quasi-static stages, or else without any.
 pub(super) fn check(root: &Section, stages: &[Stage], species: Option<&[Species]>) {
     if stages.iter().all(|stage| stage.routine == Routine::Dynamic) {
+        for key in ["history", "snapshots"] {
+            if let Some(output) = root.reopened("output").filter(|output| output.counts_increments(key)) {
+                let remedy = "give a time or a number of steps, or make a stage quasi-static";
+                output.problem(key, "counts increments, which only quasi-static stages have", remedy);
+            }
+        }
         return;
     }
     if let Some(output) = root.reopened("output").filter(|output| output.flag("energy_ledger") == Some(true)) {

@@ -282,6 +282,12 @@ impl<'a> Section<'a> {
         words.iter().position(|word| *word == value)
     }
 
+    /// Whether an interval counts increments; a faulty one does not.
+    pub fn counts_increments(&self, name: &str) -> bool {
+        let text = self.node(name).map(|node| &node.value);
+        matches!(text, Some(Value::Text(text)) if matches!(parse_interval(text), Ok(Interval::Increments(_))))
+    }
+
     /// A time, or a number of steps or increments.
     pub fn interval(&self, name: &str) -> Option<Interval> {
         let (key, node) = self.lookup(name);

@@ -68,7 +68,7 @@ pub(crate) fn sum_over_ranks(comm: &Communicator, own: u128) -> u128 {
 }
 
 fn global_hash(global: &GlobalState) -> u128 {
-    let physical = GlobalState { history_rows: 0, snapshots: 0, ..global.clone() };
+    let physical = GlobalState { history_rows: 0, snapshots: 0, previous_time: None, ..global.clone() };
     let json = serde_json::to_string(&physical).expect("a struct of numbers always has a JSON form");
     xxh3_128(json.as_bytes())
 }
@@ -100,6 +100,7 @@ pub(crate) mod tests {
             measured_stress: [1.0e6, -2.5e-3, 7.0],
             particles: u64::from(count),
             quasi_static: None,
+            previous_time: Some(0.3),
         };
         let mut particles = Vec::new();
         let mut memory = ContactMemory::new(3);
@@ -154,7 +155,7 @@ pub(crate) mod tests {
         assert_ne!(first, digest(&comm, &global, &particles, &other));
         let other = GlobalState { time: 0.3, ..global.clone() };
         assert_ne!(first, digest(&comm, &other, &particles, &memory));
-        let other = GlobalState { history_rows: 99, snapshots: 98, ..global };
+        let other = GlobalState { history_rows: 99, snapshots: 98, previous_time: None, ..global };
         assert_eq!(first, digest(&comm, &other, &particles, &memory));
     }
 

@@ -23,24 +23,38 @@ use std::time::{Duration, Instant};
 /// Steps between looks at the progress bar.
 const PROGRESS_STEPS: u64 = 256;
 
-/// Rank 0 makes the run directory with the resolved input, and clears away what belongs to a future that
-/// is computed anew from `step`: later checkpoints, and the end of an earlier run.
-///
-/// # Errors
-/// The directory cannot be made or written.
-pub fn prepare_directory(config: &Config, step: u64) -> Result<()> {
-    let directory = &config.output.directory;
-    let failed = |attempt: &str, path: &Path, error: std::io::Error| Error::File {
+/// Rows of dynamic stages where the history counts increments.
+pub const DYNAMIC_HISTORY: Interval = Interval::Steps(1000);
+
+fn failed(attempt: &str, path: &Path, error: &std::io::Error) -> Error {
+    Error::File {
         path: path.to_path_buf(),
         message: format!("cannot {attempt} ({error}); choose another output.directory or free the disk"),
-    };
-    fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, error))?;
-    checkpoint::discard_after(directory, step)?;
-    for path in ends_of_earlier_runs(directory) {
-        fs::remove_file(&path).map_err(|error| failed("remove the old file", &path, error))?;
     }
+}
+
+/// Rank 0 makes the run directory.
+///
+/// # Errors
+/// It cannot be made.
+pub fn make_directory(config: &Config) -> Result<()> {
+    let directory = &config.output.directory;
+    fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, &error))
+}
+
+/// Rank 0 writes the resolved input, and clears away what belongs to a future that is computed anew from `step`: later
+/// checkpoints, and the end of an earlier run.
+///
+/// # Errors
+/// The directory cannot be written.
+pub fn clear_future(config: &Config, step: u64) -> Result<()> {
+    let directory = &config.output.directory;
     let path = directory.join("config.resolved.toml");
-    fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, error))
+    fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, &error))?;
+    for path in ends_of_earlier_runs(directory) {
+        fs::remove_file(&path).map_err(|error| failed("remove the old file", &path, &error))?;
+    }
+    checkpoint::discard_after(directory, step)
 }
 
 /// Rank 0: a restart goes on in the directory of its checkpoint or begins one in which no run has written.
@@ -49,12 +63,8 @@ pub fn prepare_directory(config: &Config, step: u64) -> Result<()> {
 /// The directory holds another run, whose files would be mixed with those of this one.
 pub fn check_directory(config: &Config, checkpoint: &Path) -> Result<()> {
     let to = &config.output.directory;
-    let from = checkpoint.parent().filter(|from| !from.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let same = match (fs::canonicalize(from), fs::canonicalize(to)) {
-        (Ok(from), Ok(to)) => from == to,
-        _ => false,
-    };
-    if same || !to.join("history.csv").exists() {
+    let from = folder_of(checkpoint);
+    if is_same(from, to) || !to.join("history.csv").exists() {
         return Ok(());
     }
     Err(Error::Input(format!(
@@ -66,6 +76,14 @@ pub fn check_directory(config: &Config, checkpoint: &Path) -> Result<()> {
     )))
 }
 
+fn folder_of(checkpoint: &Path) -> &Path {
+    checkpoint.parent().filter(|from| !from.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn is_same(one: &Path, other: &Path) -> bool {
+    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
+}
+
 /// Rank 0: a restart that writes into another directory first takes over the history and the snapshots
 /// that lie beside the checkpoint, so that the new directory tells the whole run.
 ///
@@ -73,8 +91,8 @@ pub fn check_directory(config: &Config, checkpoint: &Path) -> Result<()> {
 /// There is no history beside the checkpoint, or it cannot be copied.
 pub fn take_over(config: &Config, checkpoint: &Path) -> Result<()> {
     let to = &config.output.directory;
-    let from = checkpoint.parent().unwrap_or(Path::new("."));
-    if to.join("history.csv").exists() {
+    let from = folder_of(checkpoint);
+    if is_same(from, to) || to.join("history.csv").exists() {
         return Ok(());
     }
     let copied = |from: &Path, to: &Path| {
@@ -114,6 +132,7 @@ pub struct RunOutput {
     log: Option<Log>,
     inertia: Inertia,
     efforts: Efforts,
+    last: [Option<u64>; 2],
 }
 
 impl RunOutput {
@@ -131,13 +150,10 @@ impl RunOutput {
             (true, rows) => HistoryWriter::resume(directory, rows).map(Some),
         };
         let history = agree(comm, opened)?;
-        let snapshots = match config.output.snapshots {
-            Some(_) => {
-                let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
-                Some(SnapshotSeries::resume(comm, directory, global.snapshots, style)?)
-            }
-            None => None,
-        };
+        // Without snapshots too: those of an earlier run, or of a future that is computed anew, go.
+        let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
+        let snapshots = SnapshotSeries::resume(comm, directory, global.snapshots, style)?;
+        let snapshots = config.output.snapshots.is_some().then_some(snapshots);
         Ok(Self {
             config: Arc::clone(config),
             history,
@@ -145,7 +161,14 @@ impl RunOutput {
             log: first.then(Log::new),
             inertia: Inertia::default(),
             efforts,
+            last: [None; 2],
         })
+    }
+
+    /// Steps of the last row and the last snapshot that this process wrote.
+    #[must_use]
+    pub fn last_steps(&self) -> [Option<u64>; 2] {
+        self.last
     }
 
     /// Write what was wanted of a report. Collective.
@@ -169,6 +192,7 @@ impl RunOutput {
                 }
                 log.row(&report.row, done);
             }
+            self.last[0] = Some(simulation.global().step);
             simulation.global_mut().history_rows += 1;
         }
         if let Some(series) = self.snapshots.as_mut().filter(|_| wanted.samples) {
@@ -179,6 +203,7 @@ impl RunOutput {
             let started = Instant::now();
             let path = series.write(&moment, total, simulation.snapshot_particles(&report.samples), contacts)?;
             self.efforts.snapshot(&path, started.elapsed().as_secs_f64());
+            self.last[1] = Some(moment.step);
             simulation.global_mut().snapshots += 1;
         }
         simulation.timers_mut().stop();
@@ -301,14 +326,23 @@ fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {
     StageTimes { neighbours, contacts, step, observe, halo, reduce, output, total: wall.as_secs_f64() }
 }
 
-/// Row number `written` is due at `written` intervals.
+/// Whether the state is the first of all, or a multiple of the interval lies within the last `steps` steps (for times the
+/// last one).
 #[must_use]
-pub fn is_due(every: Interval, global: &GlobalState, written: u64) -> bool {
+pub fn is_due(every: Interval, global: &GlobalState, steps: u64) -> bool {
+    if global.step == 0 {
+        return true;
+    }
+    // Checkpoints of older versions do not know the time before.
+    let previous = global.previous_time.unwrap_or(global.time - global.previous_time_step);
     match every {
-        Interval::Steps(steps) => global.step >= written * steps,
-        // A hair early, so that rounding of the time does not cost a step.
-        Interval::Time(time) => global.time >= written as f64 * time * (1.0 - 1e-9),
-        // Only equilibria count; the dynamic routine shows its first state.
-        Interval::Increments(_) => written == 0,
+        Interval::Steps(every) => global.step / every > global.step.saturating_sub(steps) / every,
+        Interval::Time(every) => {
+            // A hair early, so that rounding of the time does not cost a step.
+            let intervals = |time: f64| (time / (every * (1.0 - 1e-9))).floor();
+            intervals(global.time) > intervals(previous)
+        }
+        // Equilibria are counted elsewhere.
+        Interval::Increments(_) => false,
     }
 }

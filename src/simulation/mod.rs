@@ -247,7 +247,13 @@ impl Simulation {
 
     /// Enter the stage that is due; true when the run is over.
     pub fn settle_stage(&mut self) -> bool {
-        self.model.programme.settle(&mut self.global)
+        let mut skipped = Vec::new();
+        let over = self.model.programme.settle(&mut self.global, &mut skipped);
+        for stage in skipped {
+            let name = &self.model.programme.stages[stage].name;
+            self.warnings.push(format!("stage {stage} (\"{name}\") ended with its first state: its end was passed before"));
+        }
+        over
     }
 
     /// One step: contacts at the present positions, what is due at them, motion to the next ones.
@@ -426,6 +432,7 @@ impl Simulation {
         }
         self.account_for_crossings(&result.wrapped, motion.face_velocity);
         self.global.step += 1;
+        self.global.previous_time = Some(self.global.time);
         self.global.time = plan.next_time;
         self.global.previous_time_step = plan.time_step;
         self.global.strain = plan.next_strain;

@@ -2,6 +2,7 @@
 
 use super::affine::affine_energy;
 use super::{Simulation, Stage};
+use crate::config::TimeStepConfig;
 use crate::error::Result;
 use crate::exchange::ExactSum;
 use crate::exchange::exact_sum;
@@ -215,6 +216,18 @@ impl Simulation {
             }
         }
         sum
+    }
+
+    /// Refuse a fixed time step that the present state makes unstable.
+    ///
+    /// # Errors
+    /// As [`crate::integrate::time_step::TimeStepControl::choose`]; the same on every rank.
+    pub fn check_fixed_time_step(&mut self) -> Result<()> {
+        if self.is_quasi_static() || !matches!(self.model.config.time_step, TimeStepConfig::Fixed(_)) {
+            return Ok(());
+        }
+        let measured = self.observe(Wanted::default())?.measured;
+        self.model.time_step.choose(measured, self.global.step).map(|_| ())
     }
 
     /// Time step and servo from what was measured at a control step.

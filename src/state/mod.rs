@@ -143,6 +143,9 @@ pub struct GlobalState {
     /// Progress of the quasi-static routine; absent until a quasi-static stage begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quasi_static: Option<QuasiStaticState>,
+    /// Time before the last step \[s\]; absent before the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub previous_time: Option<f64>,
 }
 
 /// Where the quasi-static routine is.

@@ -1,0 +1,92 @@
+//! What a restart cannot change: what a run begins with, and the strain of stages that have begun.
+
+use crate::error::{Error, Result};
+use crate::state::GlobalState;
+use toml::{Table, Value};
+
+/// Keys of a species that say how its particles begin.
+const OF_SPECIES: [&str; 7] = ["count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin"];
+/// The same of the cell.
+const OF_CELL: [&str; 3] = ["sides", "aspect", "solid_fraction"];
+/// Keys of a stage from which its strain follows, counted from where it began.
+const OF_STAGE: [&str; 4] = ["routine", "strain_rate", "strain_increment", "hold"];
+
+/// Compare the input of a restart with the one that the checkpoint holds, both resolved.
+///
+/// # Errors
+/// The input changes what no longer acts: the particles' beginning, or the strain of a stage that has begun.
+pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<()> {
+    let read = |text: &str| text.parse::<Table>().map_err(|error| Error::Input(format!("the resolved input: {error}")));
+    let (before, now) = (read(before)?, read(now)?);
+    let mut changes = Changes(Vec::new());
+    changes.of_keys("", &before, &now, &["seed", "packing"]);
+    changes.of_tables("cell", &before, &now, &OF_CELL);
+    changes.of_lists("species", &before, &now, &OF_SPECIES, usize::MAX);
+    if !changes.0.is_empty() {
+        return Err(changes.refused(
+            "a restart takes its particles from the checkpoint, so that these keys would do nothing: put the values back \
+             (config.resolved.toml beside the checkpoint has them), or begin anew without --restart",
+        ));
+    }
+    // A stage that is just being entered may still change.
+    let begun = global.stage + usize::from(global.step != global.stage_start_step);
+    changes.of_lists("stage", &before, &now, &OF_STAGE, begun);
+    if !changes.0.is_empty() {
+        return Err(changes.refused(
+            "the strain of a stage counts from where it began, so that it cannot strain otherwise on the way: put the \
+             values back, end the stage where it is (duration, steps, until_strain) and add another one after it",
+        ));
+    }
+    Ok(())
+}
+
+/// Lines that say what has changed.
+struct Changes(Vec<String>);
+
+impl Changes {
+    /// Keys of a table that have changed or are gone; what a newer program adds is no change.
+    fn of_keys(&mut self, place: &str, before: &Table, now: &Table, keys: &[&str]) {
+        for key in keys {
+            let Some(old) = before.get(*key) else { continue };
+            self.compare(&format!("{place}{key}"), old, now.get(*key));
+        }
+    }
+
+    fn compare(&mut self, path: &str, old: &Value, new: Option<&Value>) {
+        match (old, new) {
+            // Where a file lies may change.
+            _ if path.ends_with(".path") => {}
+            (Value::Table(old), Some(Value::Table(new))) => {
+                for (key, value) in old {
+                    self.compare(&format!("{path}.{key}"), value, new.get(key));
+                }
+            }
+            (_, Some(new)) if old == new => {}
+            (_, Some(new)) => self.0.push(format!("{path} is {new} and was {old}")),
+            (_, None) => self.0.push(format!("{path} is gone and was {old}")),
+        }
+    }
+
+    fn of_tables(&mut self, name: &str, before: &Table, now: &Table, keys: &[&str]) {
+        let table = |of: &Table| of.get(name).and_then(Value::as_table).cloned().unwrap_or_default();
+        self.of_keys(&format!("{name}."), &table(before), &table(now), keys);
+    }
+
+    /// The first `count` tables of a list.
+    fn of_lists(&mut self, name: &str, before: &Table, now: &Table, keys: &[&str], count: usize) {
+        let list = |of: &Table| of.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
+        let (before, now) = (list(before), list(now));
+        for (index, old) in before.iter().enumerate().take(count) {
+            let empty = Table::new();
+            let [old, new] = [Some(old), now.get(index)].map(|v| v.and_then(Value::as_table).unwrap_or(&empty));
+            self.of_keys(&format!("{name}.{index}."), old, new, keys);
+        }
+    }
+
+    fn refused(&self, why: &str) -> Error {
+        Error::Input(format!("the checkpoint does not fit this input: {}; {why}", self.0.join(", ")))
+    }
+}
+
+#[cfg(test)]
+mod tests;

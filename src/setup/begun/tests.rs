@@ -1,0 +1,56 @@
+use super::check;
+use crate::output::digest::tests::sample;
+use crate::state::GlobalState;
+
+const INPUT: &str = "seed = 1\n[packing.random_close]\ncontraction_rate = 0.001\n[cell]\nsolid_fraction = 0.6\n\
+    [[species]]\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
+    [[stage]]\nstrain_rate = [0.0, 0.0, 1.0]\nduration = 1.0\n[[stage]]\nstrain_rate = [0.0, 0.0, -1.0]\nsteps = 5\n\
+    [output]\nhistory = \"10 steps\"\n";
+
+/// In `stage`, `steps` steps after it began.
+fn state(stage: usize, steps: u64) -> GlobalState {
+    let global = sample(1).0;
+    GlobalState { stage, step: global.stage_start_step + steps, ..global }
+}
+
+fn refused(from: &str, to: &str, global: &GlobalState) -> Option<String> {
+    assert!(INPUT.contains(from));
+    check(INPUT, &INPUT.replace(from, to), global).err().map(|error| error.to_string())
+}
+
+#[test]
+fn what_a_run_begins_with_cannot_change() {
+    for (from, to, named) in [
+        ("count = 60", "count = 61", "species.0.count is 61 and was 60"),
+        ("fixed = 1e-6", "fixed = 2e-6", "species.0.radius.fixed"),
+        ("seed = 1", "seed = 2", "seed is 2 and was 1"),
+        ("contraction_rate = 0.001", "contraction_rate = 0.002", "packing.random_close.contraction_rate"),
+        ("solid_fraction = 0.6", "sides = [1.0, 1.0, 1.0]", "cell.solid_fraction is gone and was 0.6"),
+    ] {
+        let message = refused(from, to, &state(0, 7)).unwrap();
+        assert!(message.contains(named), "{message}");
+    }
+}
+
+#[test]
+fn a_stage_that_has_begun_strains_as_it_did() {
+    let faster = ("strain_rate = [0.0, 0.0, 1.0]", "strain_rate = [0.0, 0.0, 4.0]");
+    assert!(refused(faster.0, faster.1, &state(0, 7)).unwrap().contains("stage.0.strain_rate"));
+    assert!(refused(faster.0, faster.1, &state(1, 0)).unwrap().contains("stage.0.strain_rate"));
+    assert_eq!(refused(faster.0, faster.1, &state(0, 0)), None);
+    let later = ("strain_rate = [0.0, 0.0, -1.0]", "strain_rate = [0.0, 0.0, -2.0]");
+    assert_eq!(refused(later.0, later.1, &state(0, 7)), None);
+    assert_eq!(refused(later.0, later.1, &state(1, 0)), None);
+    assert!(refused(later.0, later.1, &state(1, 1)).unwrap().contains("stage.1.strain_rate"));
+}
+
+#[test]
+fn ends_of_stages_output_and_keys_of_newer_programs_may_change() {
+    for (from, to) in [
+        ("duration = 1.0", "duration = 2.0"),
+        ("\"10 steps\"", "\"5 steps\""),
+        ("count = 60\n", "count = 60\nnovelty = 1\n"),
+    ] {
+        assert_eq!(refused(from, to, &state(0, 7)), None, "{to}");
+    }
+}
