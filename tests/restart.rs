@@ -134,3 +134,95 @@ fn a_stage_added_to_a_complete_run_is_run_as_if_it_had_been_there() {
     let relaxed = launch(&Run { config: &quasi_static, ranks: 1, threads: 1 }, &run_directory, &restart);
     assert!(matches!(relaxed.status.code(), Some(0 | 1)) && !text(&relaxed).contains("panicked"), "{}", text(&relaxed));
 }
+
+/// Names and contents of what lies in a run directory, but for checkpoints, of which only the names count.
+fn listing(directory: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(directory).expect("the directory can be read").flatten();
+    let mut files: Vec<_> = entries
+        .filter(|entry| entry.path().is_file())
+        .map(|entry| {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let content =
+                if name.ends_with(".h5") { Vec::new() } else { std::fs::read(entry.path()).unwrap_or_default() };
+            (name, content)
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn a_run_that_cannot_begin_leaves_an_earlier_one_as_it_was() {
+    let config = data("mixed_flow.toml");
+    let directory = scratch("earlier");
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let before = listing(&directory);
+    assert!(before.iter().any(|(name, _)| name == "status.toml"));
+    let half = directory.join("checkpoint-000000000500.h5");
+    let restart = ["--restart", half.to_str().expect("a UTF-8 path")];
+    let refused: [(&[&str], &str); 5] = [
+        (&["--set", "time_step=\"1 s\""], "unstable"),
+        (&["--set", "packing.random_close.perturbation=0.5"], "overlap"),
+        (&[restart[0], restart[1], "--set", "time_step=\"1 s\""], "unstable"),
+        (&[restart[0], restart[1], "--set", "stage.0.strain_rate=[\"1 1/s\", 0, 0]"], "stage.0.strain_rate"),
+        (&[restart[0], restart[1], "--set", "species.1.count=151"], "species.1.count is 151 and was 150"),
+    ];
+    for (extra, named) in refused {
+        let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &directory, extra);
+        assert!(!output.status.success() && text(&output).contains(named), "{extra:?}: {}", text(&output));
+        assert_eq!(listing(&directory), before, "{extra:?}");
+    }
+    // The history of the run is gone: nothing else may go with it.
+    std::fs::remove_file(directory.join("history.csv")).expect("it is there");
+    let before = listing(&directory);
+    let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &directory, &restart);
+    assert!(!output.status.success() && text(&output).contains("history.csv"), "{}", text(&output));
+    assert_eq!(listing(&directory), before);
+}
+
+/// Steps of the rows of a history.
+fn steps_of(directory: &Path) -> Vec<u64> {
+    let history = String::from_utf8(history_of(directory)).expect("text");
+    history
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').next().and_then(|step| step.parse().ok()).expect("a step"))
+        .collect()
+}
+
+#[test]
+fn rows_keep_a_changed_interval_after_a_restart() {
+    let config = data("mixed_flow.toml");
+    let directory = scratch("intervals");
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let half = directory.join("checkpoint-000000000500.h5");
+    let restart = ["--restart", half.to_str().expect("a UTF-8 path"), "--set", "output.history=\"90 steps\""];
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &restart);
+    assert!(output.status.success(), "{}", text(&output));
+    let expected: Vec<u64> = (0..500).step_by(50).chain((540..1000).step_by(90)).chain([1000]).collect();
+    assert_eq!(steps_of(&directory), expected);
+}
+
+#[test]
+fn rows_keep_their_interval_after_a_quasi_static_stage() {
+    let directory = scratch("after_quasi_static");
+    let config = directory.join("mixed.toml");
+    let input = "[[material]]\nname = \"m\"\ndensity = 2500\nyoung_modulus = \"1 GPa\"\npoisson_ratio = 0.25\n\
+                 restitution = 0.5\n[[species]]\nname = \"s\"\nmaterial = \"m\"\nradius = \"1 mm\"\ncount = 40\n\
+                 [contact.normal.hertz]\n[[stage]]\nroutine = \"quasi_static\"\nstrain_increment = { z = \"0.05 %\" }\n\
+                 increments = 3\n[[stage]]\nstrain_rate = { z = \"0.1 1/s\" }\nsteps = 230\n\
+                 [output]\nhistory = \"50 steps\"\nsnapshots = \"100 steps\"\nplots = false\n";
+    std::fs::write(&config, input).expect("the build folder can be written");
+    let run_directory = directory.join("run");
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &run_directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let steps = steps_of(&run_directory);
+    // The first state and three equilibria, the last of which is the dynamic stage's first state.
+    let (start, end) = (steps[3], steps[3] + 230);
+    let multiples = (start + 1..end).filter(|step| step % 50 == 0);
+    let expected: Vec<u64> = steps[..4].iter().copied().chain(multiples).chain([end]).collect();
+    assert_eq!(steps, expected);
+    assert!(snapshots(&run_directory) >= 4, "{}", snapshots(&run_directory));
+}

@@ -419,7 +419,12 @@ pub static OUTPUT: Table = Table {
     meaning: "What is written, and how often.",
     keys: &[
         key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory."),
-        key("history", Kind::Interval, Default::Word("1000 steps"), "A row of history.csv every so often; counted in increments, dynamic stages have one every 1000 steps."),
+        key(
+            "history",
+            Kind::Interval,
+            Default::Word("1000 steps"),
+            "A row of history.csv every so often; counted in increments, dynamic stages have one every 1000 steps.",
+        ),
         key("snapshots", Kind::Interval, Absent, "A snapshot every so often; none without it."),
         key(
             "dump",

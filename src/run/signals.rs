@@ -31,12 +31,12 @@ impl Signals {
             } else {
                 flag::register_conditional_default(signal, Arc::clone(&setting_up)).map(|_| ())
             };
-            at_once
-                .and_then(|()| flag::register_usize(signal, Arc::clone(&received), signal as usize))
-                .map_err(|error| Error::File {
+            at_once.and_then(|()| flag::register_usize(signal, Arc::clone(&received), signal as usize)).map_err(
+                |error| Error::File {
                     path: PathBuf::from("signals"),
                     message: format!("cannot handle signal {signal}: {error}"),
-                })?;
+                },
+            )?;
         }
         Ok(Self { received, setting_up })
     }

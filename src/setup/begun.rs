@@ -5,7 +5,8 @@ use crate::state::GlobalState;
 use toml::{Table, Value};
 
 /// Keys of a species that say how its particles begin.
-const OF_SPECIES: [&str; 7] = ["count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin"];
+const OF_SPECIES: [&str; 7] =
+    ["count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin"];
 /// The same of the cell.
 const OF_CELL: [&str; 3] = ["sides", "aspect", "solid_fraction"];
 /// Keys of a stage from which its strain follows, counted from where it began.

@@ -251,7 +251,8 @@ impl Simulation {
         let over = self.model.programme.settle(&mut self.global, &mut skipped);
         for stage in skipped {
             let name = &self.model.programme.stages[stage].name;
-            self.warnings.push(format!("stage {stage} (\"{name}\") ended with its first state: its end was passed before"));
+            self.warnings
+                .push(format!("stage {stage} (\"{name}\") ended with its first state: its end was passed before"));
         }
         over
     }
