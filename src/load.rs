@@ -38,15 +38,17 @@ impl LoadProgramme {
         self.stages.get(global.stage)
     }
 
-    /// Enter the next stage while the current one is over. Returns true when the run is over. Adds to `skipped` the
-    /// stages that were over when they began.
-    pub fn settle(&self, global: &mut GlobalState, skipped: &mut Vec<usize>) -> bool {
+    /// Enter the next stage while the current one is over. Returns true when the run is over. Warns of stages that
+    /// were over when they began.
+    pub fn settle(&self, global: &mut GlobalState, warnings: &mut Vec<String>) -> bool {
         while let Some(stage) = self.stage(global) {
             if !is_over(stage, global) {
                 return false;
             }
             if global.step == global.stage_start_step {
-                skipped.push(global.stage);
+                let (number, name) = (global.stage, &stage.name);
+                warnings
+                    .push(format!("stage {number} (\"{name}\") ended with its first state: its end was passed before"));
             }
             global.stage += 1;
             global.stage_start_time = global.time;

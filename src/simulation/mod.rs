@@ -247,14 +247,7 @@ impl Simulation {
 
     /// Enter the stage that is due; true when the run is over.
     pub fn settle_stage(&mut self) -> bool {
-        let mut skipped = Vec::new();
-        let over = self.model.programme.settle(&mut self.global, &mut skipped);
-        for stage in skipped {
-            let name = &self.model.programme.stages[stage].name;
-            self.warnings
-                .push(format!("stage {stage} (\"{name}\") ended with its first state: its end was passed before"));
-        }
-        over
+        self.model.programme.settle(&mut self.global, &mut self.warnings)
     }
 
     /// One step: contacts at the present positions, what is due at them, motion to the next ones.
