@@ -15,6 +15,7 @@ use crate::exchange::{
 use crate::force::cautions::{self, Sizes};
 use crate::force::pass::{Bodies, PairPass};
 use crate::force::simd::Simd;
+use crate::force::slider::AT_STEP;
 use crate::integrate::time_step::TimeStepControl;
 use crate::load::LoadProgramme;
 use crate::output::checkpoint::{self, Checkpoint};
@@ -303,6 +304,9 @@ fn difference(found: &[[String; 2]], needed: &[[String; 2]]) -> String {
         }
         (extra, lacking) if extra.is_empty() => format!("lack {lacking}"),
         (extra, lacking) if lacking.is_empty() => format!("keep {extra}, which the contact laws do not know"),
+        (extra, lacking) if (extra.clone() + &lacking).contains(AT_STEP) => {
+            format!("keep {extra} instead of {lacking} (springs lie half an increment ahead if any law has a dashpot)")
+        }
         (extra, lacking) => format!("keep {extra} instead of {lacking}"),
     }
 }

@@ -88,3 +88,16 @@ fn a_restart_in_the_middle_changes_nothing() {
         assert_eq!(outcome_in(&directory, &Run { config: &config, ranks, threads: 1 }, &restart), reference);
     }
 }
+
+#[test]
+fn a_restart_with_dashpots_is_refused() {
+    // Their springs are half an increment ahead.
+    let config = data("mixed_flow.toml");
+    let directory = scratch("half");
+    let run = Run { config: &config, ranks: 1, threads: 1 };
+    outcome_in(&directory, &run, &[]);
+    let half = directory.join("checkpoint-000000000500.h5");
+    let output = launch(&run, &directory, &["--restart", half.to_str().expect("a UTF-8 path")]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    assert!(text(&output).contains("tangential_force_x_at_step"), "{}", text(&output));
+}

@@ -6,7 +6,7 @@ use super::law::{Column, Energies, NormalResponse, TangentialLaw, Touch, VectorR
 use super::maxwell_zener::mean_decay;
 use super::registry::{LawChoice, LawEntry, ParameterKind, ParameterSpec, ParameterValue, Role};
 use super::shear::ShearSprings;
-use super::slider::{Slider, Turning, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss};
+use super::slider::{AT_STEP, Slider, Turning, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss};
 use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
@@ -123,11 +123,13 @@ impl<const SPRINGS: usize, const AHEAD: bool> TangentialLaw for Mindlin<SPRINGS,
     const MEMORY: usize = 3 * SPRINGS + 1;
 
     fn columns(&self) -> Vec<Column> {
+        // Other numbers than those that are half an increment ahead: no restart may take one for the other.
+        let now = if AHEAD { "" } else { AT_STEP };
         let mut columns = Vec::new();
         for (k, &rate) in self.rate.iter().enumerate() {
             let spring = if rate == 0.0 { String::new() } else { format!("branch_{}_", k + 1) };
             for axis in ["x", "y", "z"] {
-                columns.push(Column { name: format!("tangential_{spring}force_{axis}"), unit: "N" });
+                columns.push(Column { name: format!("tangential_{spring}force_{axis}{now}"), unit: "N" });
             }
         }
         columns.push(Column { name: "tangential_contact_radius".to_owned(), unit: "m" });

@@ -4,7 +4,9 @@ use super::composition::RollingVisitor;
 use super::lane::{Lane, add, dot, scale, sub};
 use super::law::{Column, Energies, NormalResponse, RollingLaw, Touch, VectorResponse};
 use super::registry::{LawChoice, LawEntry, PairProperties, ParameterKind, ParameterSpec, ParameterValue, Role};
-use super::slider::{Slider, Turning, carried_share, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss};
+use super::slider::{
+    AT_STEP, Slider, Turning, carried_share, coulomb_limit, kept_share, slip_loss, step_loss, stiffness_loss,
+};
 use crate::config::{PairConfig, Velocities};
 
 /// Registry entry.
@@ -110,8 +112,9 @@ impl RollingLaw for SpringSlider {
     const MEMORY: usize = 5;
 
     fn columns(&self) -> Vec<Column> {
+        let now = if self.velocities == Velocities::FullStep { "" } else { AT_STEP };
         let mut columns: Vec<Column> = ["rolling_moment_x", "rolling_moment_y", "rolling_moment_z", "twisting_moment"]
-            .map(|name| Column { name: name.to_owned(), unit: "N m" })
+            .map(|name| Column { name: format!("{name}{now}"), unit: "N m" })
             .into();
         columns.push(Column { name: "rolling_contact_radius".to_owned(), unit: "m" });
         columns

@@ -3,6 +3,9 @@
 use super::lane::{Lane, Vector, add, cross, dot, scale, sub};
 use super::law::Touch;
 
+/// Ends the names of memory columns that hold a force or moment as it was at the last step, without the half increment ahead.
+pub const AT_STEP: &str = "_at_step";
+
 /// How a vector stored with a contact follows it over one step: projected on the new tangent plane,
 /// turned about n by the pair's mean spin, its length kept.
 #[derive(Debug, Clone, Copy)]
