@@ -52,7 +52,7 @@ struct InputArguments {
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Threads per rank.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(config::MAX_THREADS)))]
     threads: Option<u16>,
 }
 

@@ -464,7 +464,7 @@ pub static PARALLEL: Table = Table {
     meaning: "Ranks, threads, lists. Nothing here changes a result.",
     keys: &[
         key("grid", Kind::Integers3, Absent, "Ranks per axis; chosen by itself if absent."),
-        key("threads", Kind::Integer(1), Absent, "Threads per rank; chosen by itself if absent."),
+        key("threads", Kind::Integer(1), Absent, "Threads per rank, 1024 at most; chosen by itself if absent."),
         key(
             "skin",
             number(Dimension::NONE, Range::between(0.0, 1.0)),
