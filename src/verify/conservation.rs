@@ -108,9 +108,9 @@ fn gas_run(time_step: f64, gas: Gas) -> Result<GasRun> {
     )?;
     let (after, _) = momentum(&states(&mut simulation)?);
     let momentum_drift = (0..3).map(|k| (after[k] - before[k]).abs()).fold(0.0, f64::max) / magnitude;
-    let errors = rows.iter().map(|row| (balance(row) - balance(&rows[0])) / rows[0].kinetic);
+    let mut errors = rows.iter().map(|row| (balance(row) - balance(&rows[0])) / rows[0].kinetic);
     let worst_error = errors.clone().map(f64::abs).fold(0.0, f64::max);
-    Ok(GasRun { momentum_drift, energy_error: errors.last().unwrap_or(f64::NAN), worst_error })
+    Ok(GasRun { momentum_drift, energy_error: errors.next_back().unwrap_or(f64::NAN), worst_error })
 }
 
 /// Time step of the gas \[s\]: a contact lasts some 900 of them.
