@@ -11,6 +11,7 @@ use crate::verify;
 use crate::verify::becker2021::Becker2021Options;
 use crate::verify::wahn2022::Wahn2022Options;
 use clap::{Args, Parser, Subcommand};
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -52,7 +53,7 @@ struct InputArguments {
     #[arg(long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Threads per rank.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(config::MAX_THREADS)))]
     threads: Option<u16>,
 }
 
@@ -115,8 +116,7 @@ pub fn main() -> i32 {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are no errors; clap prints each to the right stream.
-            let _ = error.print();
-            return error.exit_code();
+            return delivered(error.print()).map_or_else(|fault| report(&fault), |()| error.exit_code());
         }
     };
     let command = match arguments.command {
@@ -125,23 +125,17 @@ pub fn main() -> i32 {
     };
     let done = match command {
         Command::Check { config, input } => {
-            input.load(&config).map(|config| say!("{}", config::sheet::sheet(&config).trim_end()))
+            input.load(&config).and_then(|config| print(&config::sheet::sheet(&config)))
         }
-        Command::Init => {
-            say!("{}", config::example().trim_end());
-            Ok(())
-        }
-        Command::Reference => {
-            say!("{}", config::reference_markdown().trim_end());
-            Ok(())
-        }
+        Command::Init => print(&config::example()),
+        Command::Reference => print(&config::reference_markdown()),
         Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
             for file in files {
                 say!("{}", file.display());
             }
         }),
         Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
-        Command::Scaling(options) => scaling::main(&options),
+        Command::Scaling(options) => scaling::table(&options).and_then(|table| print(&table)),
         Command::Verify { paper: Some(Paper::Wahn2022(options)), .. } => {
             return verify::wahn2022::main(&options).unwrap_or_else(|error| report(&error));
         }
@@ -149,12 +143,29 @@ pub fn main() -> i32 {
             return verify::becker2021::main(&options).unwrap_or_else(|error| report(&error));
         }
         Command::Verify { filter, paper: None } => return verify::main(filter.as_deref()),
-        Command::Digest { path } => checkpoint::digest_of(&path).map(|digest| say!("{digest}")),
+        Command::Digest { path } => checkpoint::digest_of(&path).and_then(|digest| print(&digest.to_string())),
     };
     match done {
         Ok(()) => 0,
         Err(error) => report(&error),
     }
+}
+
+/// Print what a command is there to print; if that fails, so does the command.
+fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout();
+    delivered(writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()))
+}
+
+/// What became of a text for standard output. A reader that has gone (`| head`) has had enough.
+fn delivered(written: std::io::Result<()>) -> Result<()> {
+    written.or_else(|error| match error.kind() {
+        ErrorKind::BrokenPipe => Ok(()),
+        _ => Err(Error::File {
+            path: "standard output".into(),
+            message: format!("cannot be written ({error}); make room there, or redirect it to another place"),
+        }),
+    })
 }
 
 /// Print an error and give its exit code.
@@ -197,4 +208,17 @@ fn run_command(comm: &Communicator, arguments: &RunArguments) -> Result<i32> {
         Outcome::Requeue => EXIT_REQUEUE,
         Outcome::Stopped(signal) => 128 + signal,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_an_error_and_a_reader_that_has_gone_is_none() {
+        assert!(delivered(Ok(())).is_ok());
+        assert!(delivered(Err(ErrorKind::BrokenPipe.into())).is_ok());
+        let message = delivered(Err(ErrorKind::StorageFull.into())).unwrap_err().to_string();
+        assert!(message.starts_with("standard output: cannot be written"), "{message}");
+    }
 }

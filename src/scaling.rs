@@ -35,11 +35,11 @@ pub struct ScalingOptions {
     solid_fraction: f64,
 }
 
-/// Print the prediction, a line per number of ranks.
+/// The prediction, a line per number of ranks.
 ///
 /// # Errors
 /// [`Error::Input`] if a number is not positive.
-pub fn main(options: &ScalingOptions) -> Result<()> {
+pub fn table(options: &ScalingOptions) -> Result<String> {
     let ScalingOptions { particles, step_cost, contact_share, latency, bandwidth, skin, solid_fraction, .. } = *options;
     let positive = [
         ("--particles", particles),
@@ -61,7 +61,7 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
     let machine = Machine { step_cost, contact_share, latency, bandwidth };
     // Lengths in radii.
     let side = libm::cbrt(particles * 4.0 / 3.0 * std::f64::consts::PI / solid_fraction);
-    say!(
+    let mut lines = vec![format!(
         "{:>8} {:>14} {:>12} {:>9} {:>8} {:>9} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8}",
         "ranks",
         "grid",
@@ -75,14 +75,14 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
         "agree ms",
         "eff. %",
         "hidden %"
-    );
+    )];
     for &ranks in &options.ranks {
         let grid = Decomposition::automatic(ranks, particles as u64, 1, [side; 3]).grid;
         let geometry =
             HaloGeometry { grid, sides: [side; 3], periodic: [true; 3], margin: 2.0 + 2.0 * skin, particles };
         let traffic = geometry.expected(HaloContent { velocities: true, orientations: false }.bytes() as f64);
         let time = StepTime::new(&geometry, &traffic, &machine, 1.0);
-        say!(
+        lines.push(format!(
             "{:>8} {:>14} {:>12.4e} {:>9.0} {:>8.1} {:>9.1} {:>10.4} {:>10.4} {:>10.4} {:>10.4} {:>8.1} {:>8.1}",
             grid.iter().product::<usize>(),
             grid.map(|n| n.to_string()).join(" × "),
@@ -96,12 +96,12 @@ pub fn main(options: &ScalingOptions) -> Result<()> {
             1e3 * time.agreement,
             100.0 * time.efficiency(),
             100.0 * time.efficiency_with_overlap()
-        );
+        ));
     }
-    say!(
+    lines.push(format!(
         "eff.: work over step time, nothing hidden; hidden: halo behind inner contacts. Assumed: {step_cost:e} s per \
          particle and step, {contact_share} of it contacts; latency {latency:e} s; {bandwidth:e} B/s per rank; agreement 2 \
          log2 P latencies; even load."
-    );
-    Ok(())
+    ));
+    Ok(lines.join("\n"))
 }

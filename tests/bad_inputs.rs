@@ -48,6 +48,9 @@ fn a_fault_on_the_command_line_is_shown_as_one() {
         ("material.0.densty=1", "material.0.densty: unknown key `densty`; did you mean `density`?"),
         ("parallel.threads=0", "--> command line, --set:1:18"),
         ("..=1", "has an empty part"),
+        ("parallel.threads=100000", "parallel.threads: 100000 threads per rank"),
+        ("stage=[]", "error: stage: is an empty list"),
+        ("title=[]", "error: title: found a list of 0"),
     ];
     for (argument, fragment) in cases {
         let message = load(&file, &[argument.to_owned()], None, None).unwrap_err().to_string();
@@ -55,6 +58,21 @@ fn a_fault_on_the_command_line_is_shown_as_one() {
     }
     let message = load(&file, &[], None, Some(0)).unwrap_err().to_string();
     assert!(message.contains("command line, --threads"), "{message}");
+}
+
+#[test]
+fn whatever_is_refused_has_its_reason() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/quickstart.toml");
+    let keys =
+        "title seed particles gravity cell material species contact pair packing load stage time_step output parallel";
+    for key in keys.split(' ') {
+        for value in ["[]", "{}", "[[]]", "[{}]", "true", "-1", "nan", "word"] {
+            if let Err(error) = load(&file, &[format!("{key}={value}")], None, None) {
+                let message = error.to_string();
+                assert!(message.contains("error: ") && !message.contains(": 0 problems"), "{key}={value}: {message}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -256,7 +256,9 @@ static FILE: Table = Table {
             Kind::Text,
             Required,
             "CSV, HDF5 or LAMMPS data file, relative to this input. CSV columns: species, x_m, y_m, z_m, radius_m \
-         (of ellipsoids a_m, b_m, c_m, qw, qx, qy, qz instead) and optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s. LAMMPS data file \
+         (of ellipsoids a_m, b_m, c_m, qw, qx, qy, qz instead) and optionally vx_m_per_s, vy_m_per_s, vz_m_per_s, wx_rad_per_s, wy_rad_per_s, wz_rad_per_s; lengths and velocities also with mm, um or nm for m. HDF5 \
+         (.h5, .hdf5): a one-dimensional dataset per column, with the column's name, in the root group, all of one \
+         length; species as strings, the others as floating point; row by row as in CSV. LAMMPS data file \
          (.data, .lmp, or any name if a line `N atoms` is near its beginning): atom_style sphere, SI units, upright \
          box, ids 1 to N in any order; type 1 is the first species, type 2 the second; densities must be those of the \
          materials.",
@@ -469,7 +471,7 @@ pub static PARALLEL: Table = Table {
     meaning: "Ranks, threads, lists. Nothing here changes a result.",
     keys: &[
         key("grid", Kind::Integers3, Absent, "Ranks per axis; chosen by itself if absent."),
-        key("threads", Kind::Integer(1), Absent, "Threads per rank; chosen by itself if absent."),
+        key("threads", Kind::Integer(1), Absent, "Threads per rank, 1024 at most; chosen by itself if absent."),
         key(
             "skin",
             number(Dimension::NONE, Range::between(0.0, 1.0)),

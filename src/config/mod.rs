@@ -401,6 +401,9 @@ pub enum Interval {
     Increments(u64),
 }
 
+/// Most threads that a rank may have.
+pub const MAX_THREADS: u16 = 1024;
+
 /// Ranks, threads, lists.
 #[derive(Debug, Clone)]
 pub struct ParallelConfig {

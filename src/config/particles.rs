@@ -133,6 +133,9 @@ fn share(
     counts: &[Option<u64>],
     fractions: &[Option<f64>],
 ) -> Option<Vec<usize>> {
+    if sections.is_empty() {
+        return None; // reported as such
+    }
     let by_fraction = sections.iter().any(|section| section.given("fraction"));
     let (wanted, other) = if by_fraction { ("fraction", "count") } else { ("count", "fraction") };
     let mut complete = true;

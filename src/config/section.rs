@@ -61,6 +61,11 @@ impl<'a> Section<'a> {
         self.node?.get(name).map(|entry| &entry.node)
     }
 
+    /// A list without entries stands at the key.
+    pub fn is_empty_list(&self, name: &str) -> bool {
+        self.node(name).is_some_and(|node| matches!(&node.value, Value::List(items) if items.is_empty()))
+    }
+
     /// The dotted key of `name` in this section.
     pub fn dotted(&self, name: &str) -> String {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
@@ -165,6 +170,10 @@ impl<'a> Section<'a> {
             self.report(node.place.clone(), name, format!("found {}", node.found()), remedy);
             return Vec::new();
         };
+        if items.is_empty() && matches!(key.default, Default::Required) {
+            let remedy = format!("give at least one [[{}]] section", self.dotted(name));
+            self.report(node.place.clone(), name, "is an empty list".to_owned(), remedy);
+        }
         let section = |(index, item): (usize, &'a Node)| {
             let path = format!("{name}.{index}");
             if item.entries().is_none() {

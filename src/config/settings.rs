@@ -3,8 +3,8 @@
 use super::alternatives::Chosen;
 use super::section::Section;
 use super::{
-    Boundary, CellConfig, DropAndRollConfig, OutputConfig, PackingConfig, ParallelConfig, Replication, SimdConfig,
-    Species, TimeStepConfig,
+    Boundary, CellConfig, DropAndRollConfig, MAX_THREADS, OutputConfig, PackingConfig, ParallelConfig, Replication,
+    SimdConfig, Species, TimeStepConfig,
 };
 use std::path::{Path, PathBuf};
 
@@ -111,6 +111,9 @@ const DENSEST: f64 = 0.7405;
 /// The densest packing known of ellipsoids (Donev et al. 2004, doi:10.1103/PhysRevLett.92.255506).
 const DENSEST_OF_ELLIPSOIDS: f64 = 0.7708;
 
+/// Solid fraction assumed where a random packing finds its own.
+pub(super) const RANDOM_CLOSE: f64 = 0.635;
+
 /// Whether cell, packing and particles fit together.
 pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingConfig, species: &[Species]) {
     let Some(section) = root.reopened("cell") else { return };
@@ -140,23 +143,36 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
         (None, Some(fraction)) => ("solid_fraction", fraction),
-        (None, None) => return,
+        (None, None) => ("aspect", RANDOM_CLOSE),
     };
     if fraction > if spherical { DENSEST } else { DENSEST_OF_ELLIPSOIDS } {
         let message = format!("the particles would fill {fraction:.3} of the cell");
         let remedy = "spheres cannot fill more than 0.74, random ones about 0.64: use a larger cell or fewer particles";
         section.problem(key, message, remedy);
     }
-    let largest = species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
-    for axis in 0..3 {
-        if let Some(side) = cell.sides.map(|sides| sides[axis]).filter(|side| *side < 2.0 * largest) {
-            let message = format!(
-                "side {} is {side:e} m, the largest particle {:e} m across",
-                ["x", "y", "z"][axis],
-                2.0 * largest
-            );
-            section.problem("sides", message, "make every side at least one diameter");
-        }
+    // Drop and roll knows its floor when it has drawn its particles.
+    if cell.sides.is_none() && matches!(packing, PackingConfig::DropAndRoll(_)) {
+        return;
+    }
+    let largest = 2.0 * species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
+    let (key, remedy) = if cell.sides.is_some() {
+        ("sides", "make every side at least one diameter")
+    } else {
+        ("aspect", "use more particles, proportions nearer to 1, or a lower `solid_fraction`")
+    };
+    let sides = cell.sides.unwrap_or_else(|| cell.sides_at(volume / fraction));
+    for (side, axis) in sides.into_iter().zip(["x", "y", "z"]).filter(|(side, _)| *side < largest) {
+        let side = if cell.sides.is_some() { format!("{side:e}") } else { format!("about {side:.3e}") };
+        let message = format!("side {axis} is {side} m, the largest particle {largest:e} m across");
+        section.problem(key, message, remedy);
+    }
+}
+
+impl CellConfig {
+    /// Sides of a box of this volume in the proportions `aspect` \[m\].
+    pub(super) fn sides_at(&self, volume: f64) -> [f64; 3] {
+        let unit = libm::cbrt(volume / self.aspect.iter().product::<f64>());
+        self.aspect.map(|proportion| proportion * unit)
     }
 }
 
@@ -239,6 +255,9 @@ pub(super) fn read_parallel(root: &Section) -> Option<ParallelConfig> {
     let section = root.table("parallel")?;
     let grid = section.integers3("grid");
     let threads = section.integer("threads");
+    if let Some(count) = threads.filter(|count| *count > u64::from(MAX_THREADS)) {
+        section.problem("threads", format!("{count} threads per rank"), format!("allowed: 1 to {MAX_THREADS}"));
+    }
     let skin = section.number("skin");
     let min_particles_per_rank = section.integer("min_particles_per_rank");
     let simd = section.choice("simd").map(|index| SIMD_LEVELS[index]);

@@ -4,6 +4,7 @@
 mod quasi_static;
 
 use super::programme::{Progress, advance};
+use super::settings::RANDOM_CLOSE;
 use super::{AxisControl, Config, Material, PackingConfig, PairConfig, Routine, Species, TimeStepConfig};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -12,8 +13,6 @@ use std::fmt::Write as _;
 const BYTES_PER_PARTICLE: f64 = 450.0;
 /// Contacts per particle times two in a dense packing.
 const COORDINATION: f64 = 6.0;
-/// Solid fraction assumed where random close packing finds its own.
-const RANDOM_CLOSE: f64 = 0.635;
 /// Solid fraction of equal spheres after drop and roll.
 const DROP_AND_ROLL: f64 = 0.58;
 /// Largest ε̇²·density_scaling \[1/s²\] at which packings near jamming still answer quasi-statically.
@@ -261,9 +260,7 @@ fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
     }
     let base_sides = config.cell.sides.or_else(|| {
         let volume = estimate.solid_volume / config.replication.number() as f64 / estimate.solid_fraction?;
-        let [a, b, c] = config.cell.aspect;
-        let unit = libm::cbrt(volume / (a * b * c));
-        Some([a * unit, b * unit, c * unit])
+        Some(config.cell.sides_at(volume))
     });
     if let Some(sides) = base_sides.map(|sides| config.replication.whole(sides)) {
         let text = sides.map(|side| quantity(side, "m")).join(" × ");

@@ -29,6 +29,9 @@ pub(super) fn read(root: &Section, cell: Option<&CellConfig>, routine: Routine) 
             continue;
         }
         refuse_own_load(section);
+        if section.is_empty_list("part") {
+            section.problem("part", "is an empty list", "say what one cycle consists of, in [[stage.part]] sections");
+        }
         let parts: Vec<(Option<Stage>, Section)> = parts
             .into_iter()
             .enumerate()
@@ -201,22 +204,21 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
     };
     let only_strain =
         stage.duration.is_none() && stage.steps.is_none() && stage.increments.is_none() && stage.until_stress.is_none();
-    if let (Some((axis, target)), true) = (stage.until_strain, only_strain)
+    if let Some((axis, target)) = stage.until_strain
         && let AxisControl::StrainRate(rate) = stage.axes[axis]
     {
         let start = progress.strain[axis];
-        if rate == 0.0 || start.is_some_and(|start| (target - start) * rate <= 0.0) {
+        // What lies behind would end the stage before its first step, whatever else may end it.
+        let behind = rate != 0.0 && start.is_some_and(|start| (target - start) * rate <= 0.0);
+        if behind || rate == 0.0 && only_strain {
             let start = start.map_or_else(String::new, |start| format!(" from strain {start}"));
-            let (what, other) = match stage.routine {
-                Routine::Dynamic => {
-                    (format!("at strain rate {rate} 1/s"), "the strain rate's sign, or end by duration")
-                }
-                Routine::QuasiStatic => {
-                    (format!("in increments of {rate}"), "the increment's sign, or end by increments")
-                }
+            let (what, sign, end) = match stage.routine {
+                Routine::Dynamic => (format!("at strain rate {rate} 1/s"), "strain rate's", "duration"),
+                Routine::QuasiStatic => (format!("in increments of {rate}"), "increment's", "increments"),
             };
             let message = format!("never reached{start} {what} of the {} axis", AXES[axis]);
-            section.problem("until_strain", message, format!("change the value, {other}"));
+            let other = if only_strain { format!("end by {end}") } else { "remove it".to_owned() };
+            section.problem("until_strain", message, format!("change the value, the {sign} sign, or {other}"));
             progress.lose_track();
             stages.push(None);
             return;
@@ -226,11 +228,11 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
     for axis in 0..3 {
         if progress.strain[axis].is_some_and(|strain| strain >= 1.0) {
             let message = format!("the {} axis reaches a strain of 1 or more: the cell collapses", AXES[axis]);
-            section.problem(
-                "strain_rate",
-                message,
-                "end the stage earlier, or strain more slowly (compression is positive)",
-            );
+            let (key, slower) = match stage.routine {
+                Routine::Dynamic => ("strain_rate", "strain more slowly"),
+                Routine::QuasiStatic => ("strain_increment", "strain less per increment"),
+            };
+            section.problem(key, message, format!("end the stage earlier, or {slower} (compression is positive)"));
             progress.lose_track();
             stages.push(None);
             return;

@@ -24,8 +24,8 @@ impl Worst {
         let ([low, high], fraction) = (self.ids, self.fraction);
         Err(Error::Packing(format!(
             "particles {low} and {high} overlap by {fraction:.4} of the smaller radius, where {max_fraction} is allowed; \
-             correct their positions or radii, enlarge the cell, lower packing.perturbation, or raise the allowed \
-             overlap fraction"
+             correct their positions or radii, enlarge the cell, lower `perturbation` in the section of the packing (such as \
+             packing.random_close.perturbation), or raise contact.max_overlap_fraction"
         )))
     }
 }

@@ -19,7 +19,7 @@ pub fn total(config: &Config, base: usize) -> Result<u64> {
     if total > MAX_PARTICLES as u64 {
         return Err(Error::Packing(format!(
             "{copies} copies of {base} particles are more than ids can number ({MAX_PARTICLES}); reduce \
-             packing.replicate"
+             `replicate` in the section of the packing (such as packing.random_close.replicate)"
         )));
     }
     Ok(total)
@@ -118,6 +118,6 @@ mod tests {
     #[test]
     fn more_than_ids_can_number_is_an_error() {
         let (_, given) = base_and_config([10_000, 1000, 1000], 0.0);
-        assert!(total(&given, 30).unwrap_err().to_string().contains("reduce packing.replicate"));
+        assert!(total(&given, 30).unwrap_err().to_string().contains("packing.random_close.replicate"));
     }
 }

@@ -1,6 +1,7 @@
 //! Names of snapshot files and the two time indices beside them: the JSON series that ParaView opens
 //! and the XDMF sidecar for older readers. Both are replaced atomically.
 
+use super::Moment;
 use crate::error::{Error, Result};
 use crate::output::files::{io_error, write_atomically};
 use serde_json::{Value, json};
@@ -32,6 +33,13 @@ fn series_name(kind: &str) -> String {
     format!("{kind}.vtkhdf.series")
 }
 
+/// What tells the snapshots apart in the indices: their times \[s\], or, if any two share one (in quasi-static
+/// stages time stands still), the steps of all.
+pub(super) fn times(moments: &[Moment]) -> Vec<f64> {
+    let distinct = moments.windows(2).all(|pair| pair[1].time > pair[0].time);
+    moments.iter().map(|moment| if distinct { moment.time } else { moment.step as f64 }).collect()
+}
+
 /// Index of all snapshots of a kind.
 ///
 /// # Errors
@@ -43,27 +51,25 @@ pub(super) fn write_series(folder: &Path, kind: &str, times: &[f64], name: fn(us
     write_atomically(&folder.join(series_name(kind)), text.as_bytes())
 }
 
-/// Times of the first `count` snapshots.
+/// That the index lists at least `count` snapshots.
 ///
 /// # Errors
-/// [`Error::File`] when the index is missing, cannot be read or holds fewer.
-pub(super) fn read_times(folder: &Path, count: usize) -> Result<Vec<f64>> {
+/// [`Error::File`] when it is missing, cannot be read or holds fewer.
+pub(super) fn check_length(folder: &Path, count: usize) -> Result<()> {
     if count == 0 {
-        return Ok(Vec::new());
+        return Ok(());
     }
     let path = folder.join(series_name("particles"));
     let text = fs::read_to_string(&path).map_err(|error| io_error(&path, "read the index of snapshots", &error))?;
     let index: Value = serde_json::from_str(&text).unwrap_or_default();
-    let files = index["files"].as_array().map(Vec::as_slice).unwrap_or_default();
-    let times: Vec<f64> = files.iter().map_while(|file| file["time"].as_f64()).take(count).collect();
-    if times.len() < count {
+    let listed = index["files"].as_array().map_or(0, Vec::len);
+    if listed < count {
         let message = format!(
-            "lists {} snapshots where the checkpoint has written {count}; restart into a new output directory",
-            times.len()
+            "lists {listed} snapshots where the checkpoint has written {count}; restart into a new output directory"
         );
         return Err(Error::File { path, message });
     }
-    Ok(times)
+    Ok(())
 }
 
 /// Cut the existing indices down to these snapshots.
@@ -84,7 +90,7 @@ pub(super) fn keep_first(folder: &Path, times: &[f64]) -> Result<()> {
         Ok(_) if times.is_empty() => {
             fs::remove_file(&path).map_err(|error| io_error(&path, "delete the old index", &error))
         }
-        Ok(text) => write_atomically(&path, first_grids(&text, times.len()).as_bytes()),
+        Ok(text) => write_atomically(&path, first_grids(&text, times).as_bytes()),
         Err(_) => Ok(()),
     }
 }
@@ -92,10 +98,20 @@ pub(super) fn keep_first(folder: &Path, times: &[f64]) -> Result<()> {
 const GRID_END: &str = "      </Grid>\n";
 const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
-/// The sidecar with only its first `count` grids.
-fn first_grids(text: &str, count: usize) -> String {
-    let end = text.match_indices(GRID_END).nth(count - 1).map_or(0, |(at, _)| at + GRID_END.len());
-    format!("{}{TAIL}", &text[..end])
+const TIME: &str = "        <Time ";
+
+/// The sidecar with only its first grids, at these times.
+fn first_grids(text: &str, times: &[f64]) -> String {
+    let end = text.match_indices(GRID_END).nth(times.len() - 1).map_or(0, |(at, _)| at + GRID_END.len());
+    let mut times = times.iter();
+    let lines = text[..end].lines().map(|line| match times.as_slice() {
+        [time, ..] if line.starts_with(TIME) => {
+            times.next();
+            format!("{TIME}Value=\"{time:?}\"/>\n")
+        }
+        _ => format!("{line}\n"),
+    });
+    lines.chain([TAIL.to_owned()]).collect()
 }
 
 /// XDMF over the same datasets.
@@ -117,7 +133,7 @@ pub(super) fn write_xdmf(folder: &Path, times: &[f64], total: u64, ellipsoids: b
 
 fn write_grid(text: &mut String, file: &str, time: f64, total: u64, ellipsoids: bool) -> std::fmt::Result {
     writeln!(text, "      <Grid Name=\"{file}\" GridType=\"Uniform\">")?;
-    writeln!(text, "        <Time Value=\"{time:?}\"/>")?;
+    writeln!(text, "{TIME}Value=\"{time:?}\"/>")?;
     writeln!(
         text,
         "        <Topology TopologyType=\"Polyvertex\" NumberOfElements=\"{total}\" NodesPerElement=\"1\"/>"

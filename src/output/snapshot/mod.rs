@@ -75,7 +75,8 @@ pub struct SnapshotContacts {
 }
 
 /// The moment that a snapshot shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Moment {
     /// Steps done.
     pub step: u64,
@@ -98,7 +99,7 @@ pub struct Style {
 pub struct SnapshotSeries {
     comm: Communicator,
     folder: PathBuf,
-    times: Vec<f64>,
+    moments: Vec<Moment>,
     style: Style,
 }
 
@@ -115,18 +116,18 @@ impl SnapshotSeries {
     /// Go on after the first `count` snapshots of a run (restart), removing later ones. Collective.
     ///
     /// # Errors
-    /// [`crate::error::Error::File`] on every rank when the index holds fewer or files cannot be removed.
+    /// [`crate::error::Error::File`] on every rank when there are fewer or files cannot be removed.
     pub fn resume(comm: &Communicator, directory: &Path, count: u64, style: Style) -> Result<Self> {
         let folder = directory.join("snapshots");
         let kept = if comm.rank() == 0 { keep_first(&folder, count) } else { Ok(Vec::new()) };
-        let times = agree(comm, kept)?;
-        Ok(Self { comm: comm.clone(), folder, times: share(comm, &times), style })
+        let moments = agree(comm, kept)?;
+        Ok(Self { comm: comm.clone(), folder, moments: share(comm, &moments), style })
     }
 
     /// Number of snapshots written.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.times.len() as u64
+        self.moments.len() as u64
     }
 
     /// Write the next snapshot. Collective; every rank passes its owned particles (of `total` over all
@@ -142,7 +143,7 @@ impl SnapshotSeries {
         particles: Vec<SnapshotParticle>,
         contacts: Option<SnapshotContacts>,
     ) -> Result<PathBuf> {
-        let number = self.times.len();
+        let number = self.moments.len();
         let (first, particles) = blocks::particles_by_id(&self.comm, total, particles);
         let path = self.folder.join(index::particle_file(number));
         let block = vtkhdf::Block { total, first, particles: &particles, ellipsoids: self.style.ellipsoids };
@@ -154,29 +155,32 @@ impl SnapshotSeries {
             let contacts = blocks::contacts_by_key(&self.comm, total, contacts);
             vtkhdf::write_contacts(&self.comm, &self.folder.join(index::contact_file(number)), moment, &contacts)?;
         }
-        self.times.push(moment.time);
+        self.moments.push(*moment);
         let indexed = if self.comm.rank() == 0 { self.write_index(total) } else { Ok(()) };
         agree(&self.comm, indexed)?;
         Ok(path)
     }
 
     fn write_index(&self, total: u64) -> Result<()> {
-        index::write_series(&self.folder, "particles", &self.times, index::particle_file)?;
-        if self.folder.join(index::contact_file(self.times.len() - 1)).exists() {
-            index::write_series(&self.folder, "contacts", &self.times, index::contact_file)?;
+        let times = index::times(&self.moments);
+        index::write_series(&self.folder, "particles", &times, index::particle_file)?;
+        if self.folder.join(index::contact_file(times.len() - 1)).exists() {
+            index::write_series(&self.folder, "contacts", &times, index::contact_file)?;
         }
-        index::write_xdmf(&self.folder, &self.times, total, self.style.ellipsoids)
+        index::write_xdmf(&self.folder, &times, total, self.style.ellipsoids)
     }
 }
 
-/// Remove all snapshots but the first `count` and return the times of those. Rank 0.
-fn keep_first(folder: &Path, count: u64) -> Result<Vec<f64>> {
+/// Remove all snapshots but the first `count` and return the moments of those. Rank 0.
+fn keep_first(folder: &Path, count: u64) -> Result<Vec<Moment>> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     if !folder.exists() && count == 0 {
         return Ok(Vec::new());
     }
     create_folder(folder)?;
-    let times = index::read_times(folder, count)?;
+    index::check_length(folder, count)?;
+    let moment = |number| vtkhdf::read_moment(&folder.join(index::particle_file(number)));
+    let moments: Vec<Moment> = (0..count).map(moment).collect::<Result<_>>()?;
     let entries = fs::read_dir(folder).map_err(|error| io_error(folder, "read the folder", &error))?;
     for entry in entries.flatten() {
         let name = entry.file_name();
@@ -186,13 +190,13 @@ fn keep_first(folder: &Path, count: u64) -> Result<Vec<f64>> {
                 .map_err(|error| io_error(&entry.path(), "delete the old snapshot", &error))?;
         }
     }
-    index::keep_first(folder, &times)?;
-    Ok(times)
+    index::keep_first(folder, &index::times(&moments))?;
+    Ok(moments)
 }
 
-/// The times that rank 0 knows, on all ranks.
-fn share(comm: &Communicator, times: &[f64]) -> Vec<f64> {
-    let mut bytes = bytemuck::cast_slice::<f64, u8>(times).to_vec();
+/// The moments that rank 0 knows, on all ranks.
+fn share(comm: &Communicator, moments: &[Moment]) -> Vec<Moment> {
+    let mut bytes = bytemuck::cast_slice::<Moment, u8>(moments).to_vec();
     comm.broadcast(0, &mut bytes);
     bytemuck::pod_collect_to_vec(&bytes)
 }

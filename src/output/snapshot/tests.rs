@@ -67,10 +67,42 @@ fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn a_resumed_series_equals_an_uninterrupted_one_byte_for_byte() {
+    resumes_after_three(|k| k as f64 / 3.0);
+}
+
+#[test]
+fn a_series_resumed_from_where_time_still_went_on_tells_seconds_again() {
+    resumes_after_three(|k| k.min(2) as f64 / 3.0);
+    resumes_after_three(|_| 0.0);
+}
+
+#[test]
+fn where_time_stands_still_the_indices_count_steps() {
+    let comm = Communicator::single();
+    let folder = tempfile::tempdir().expect("folder");
+    let mut series = SnapshotSeries::create(&comm, folder.path(), Style::default()).expect("create");
+    let mut write = |step: u64, time: f64| {
+        series.write(&Moment { step, time, ..MOMENT }, 2, particles(2), None).expect("write");
+        let text = |name: &str| fs::read_to_string(folder.path().join("snapshots").join(name)).expect("index");
+        let index: serde_json::Value = serde_json::from_str(&text("particles.vtkhdf.series")).expect("JSON");
+        let files = index["files"].as_array().expect("files");
+        let times: Vec<f64> = files.iter().map(|file| file["time"].as_f64().expect("time")).collect();
+        let sidecar = text("particles.xmf");
+        assert!(times.iter().all(|time| sidecar.contains(&format!("<Time Value=\"{time:?}\"/>"))), "{sidecar}");
+        times
+    };
+    assert_eq!(write(0, 0.0), [0.0]);
+    assert_eq!(write(40, 0.5), [0.0, 0.5]);
+    assert_eq!(write(90, 0.5), [0.0, 40.0, 90.0]);
+    assert_eq!(write(95, 0.7), [0.0, 40.0, 90.0, 95.0]);
+}
+
+/// A series of five snapshots at these times is stopped, resumed after three, and equals one of three.
+fn resumes_after_three(time: impl Fn(u64) -> f64) {
     let comm = Communicator::single();
     let [whole, stopped] = [(); 2].map(|()| tempfile::tempdir().expect("folder"));
     let write = |series: &mut SnapshotSeries, k: u64| {
-        let moment = Moment { step: k, time: k as f64 / 3.0, ..MOMENT };
+        let moment = Moment { step: k, time: time(k), ..MOMENT };
         series.write(&moment, 6, particles(6), Some(contacts(5))).expect("write");
     };
     let mut series = SnapshotSeries::create(&comm, whole.path(), ALL).expect("create");
@@ -83,6 +115,9 @@ fn a_resumed_series_equals_an_uninterrupted_one_byte_for_byte() {
     assert_eq!(series.count(), 3);
     write(&mut series, 3);
     assert_eq!(series.count(), 4);
+    let mut uninterrupted = SnapshotSeries::resume(&comm, whole.path(), 3, ALL).expect("resume");
+    write(&mut uninterrupted, 3);
+    assert_eq!(contents(stopped.path()), contents(whole.path()));
     let fresh = SnapshotSeries::create(&comm, stopped.path(), ALL).expect("create");
     assert_eq!(fresh.count(), 0);
     assert!(contents(stopped.path()).is_empty());

@@ -5,10 +5,14 @@ use super::{Moment, SnapshotContacts, SnapshotParticle};
 use crate::error::Result;
 use crate::exchange::Communicator;
 use crate::force::law::Column;
-use crate::output::hdf5_file::{Kind, Layout, Scalar, Value, Writer};
+use crate::output::hdf5_file::{Kind, Layout, Reader, Scalar, Value, Writer};
 use crate::state::shape::rotation_matrix;
 use std::collections::BTreeSet;
 use std::path::Path;
+
+const TIME: &str = "VTKHDF/FieldData/TimeValue";
+const STEP: &str = "VTKHDF/FieldData/step";
+const SIDES: &str = "VTKHDF/FieldData/cell_sides";
 
 const CELL_KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
@@ -153,10 +157,21 @@ fn frame(moment: &Moment, points: u64, cells_in: &str, cells: u64, points_per_ce
         layout.dataset(&format!("VTKHDF/{kind}/Connectivity"), Kind::I64, entries);
     }
     layout.group("VTKHDF/FieldData");
-    layout.constant("VTKHDF/FieldData/TimeValue", Value::Reals(vec![moment.time]));
-    layout.constant("VTKHDF/FieldData/step", Value::Integers(vec![moment.step as i64]));
-    layout.constant("VTKHDF/FieldData/cell_sides", Value::Reals(moment.sides.to_vec()));
+    layout.constant(TIME, Value::Reals(vec![moment.time]));
+    layout.constant(STEP, Value::Integers(vec![moment.step as i64]));
+    layout.constant(SIDES, Value::Reals(moment.sides.to_vec()));
     layout
+}
+
+/// The moment that a file shows. One rank.
+///
+/// # Errors
+/// As [`Reader::open`] and [`Reader::read`].
+pub(super) fn read_moment(path: &Path) -> Result<Moment> {
+    let reader = Reader::open(path)?;
+    let (time, step) = (reader.read::<f64>(TIME, 0, 1)?, reader.read::<i64>(STEP, 0, 1)?);
+    let sides = reader.read::<f64>(SIDES, 0, 3)?;
+    Ok(Moment { step: step[0] as u64, time: time[0], sides: [sides[0], sides[1], sides[2]] })
 }
 
 fn array(layout: &mut Layout, path: &str, kind: Kind, rows: u64, columns: u64) {

@@ -92,11 +92,15 @@ const MAX_PROBLEMS: usize = 10;
 ///
 /// # Errors
 /// [`Error::Input`] with line, column, value and remedy of every problem (the first ten); a box that is not
-/// that of `region`; a table without sides in `region`.
+/// that of `region`; a table without sides in `region`; a file without particles.
 pub fn read(path: &Path, species: &[&str], region: &Region) -> Result<Contents> {
     let read = format(path).and_then(|format| match format {
         Format::Lammps => lammps::read(path, species, region),
         Format::Csv | Format::Hdf5 => from_table(&table(path, format)?, species, region),
+    });
+    let read = read.and_then(|contents| match contents.rows[..] {
+        [] => Err("the file holds no particles; give it a row for each".into()),
+        _ => Ok(contents),
     });
     read.map_err(|message| Error::Input(format!("{}: {message}", path.display())))
 }

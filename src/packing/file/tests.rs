@@ -43,6 +43,11 @@ fn a_table_gives_particles_in_the_order_of_its_rows() {
 }
 
 #[test]
+fn a_file_without_particles_is_refused_as_such() {
+    assert_refused("species,x_m,y_m,z_m,radius_m\n# none\n", &["the file holds no particles"]);
+}
+
+#[test]
 fn units_and_motion_are_understood_in_any_order_of_columns() {
     let rows = read_text(
         "radius_um,wz_rad_per_s,wy_rad_per_s,wx_rad_per_s,z_mm,y_nm,x_m,species,vx_m_per_s,vy_mm_per_s,vz_um_per_s\n\
