@@ -150,8 +150,9 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         let remedy = "spheres cannot fill more than 0.74, random ones about 0.64: use a larger cell or fewer particles";
         section.problem(key, message, remedy);
     }
-    // Drop and roll knows its floor when it has drawn its particles.
-    if cell.sides.is_none() && matches!(packing, PackingConfig::DropAndRoll(_)) {
+    // Drop and roll knows its floor when it has drawn its particles, and one particle alone has its own images as neighbours.
+    let alone = species.iter().map(|species| species.count).sum::<usize>() == 1;
+    if cell.sides.is_none() && (alone || matches!(packing, PackingConfig::DropAndRoll(_))) {
         return;
     }
     let largest = 2.0 * species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
