@@ -5,7 +5,7 @@ mod inertia;
 mod output;
 mod signals;
 
-use crate::config::{Config, Interval};
+use crate::config::{Config, Interval, Routine};
 use crate::error::Result;
 use crate::exchange::{Communicator, agree};
 use crate::force::observe::Wanted;
@@ -13,6 +13,7 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
+use crate::state::GlobalState;
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
@@ -67,8 +68,10 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     }
     // What idle ranks hold so far (id blocks of a checkpoint) goes to those that compute.
     let initial = setup::onto_first(comm, ranks, initial)?;
-    signals.heed();
-    let Some(active) = comm.first(ranks) else { return Ok(Outcome::Finished) };
+    let Some(active) = comm.first(ranks) else {
+        signals.heed();
+        return Ok(Outcome::Finished);
+    };
     let (mut simulation, report) = setup::timed_simulation(active, config, decomposition, initial, threads)?;
     simulation.check_fixed_time_step()?;
     efforts.report(&report);
@@ -77,7 +80,11 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
         say!("packing: largest overlap {fraction:.1e} of the smaller radius (particles {low} and {high})");
     }
     // Only now that nothing speaks against the run does it touch what lies in its directory.
-    let prepared = if simulation.comm().rank() == 0 { prepare(config, checkpoint.as_deref()) } else { Ok(()) };
+    signals.heed();
+    let prepared = match simulation.comm().rank() {
+        0 => prepare(config, checkpoint.as_deref(), simulation.global()),
+        _ => Ok(()),
+    };
     agree(simulation.comm(), prepared)?;
     Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }
@@ -122,11 +129,16 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
     Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
 }
 
-fn prepare(config: &Config, checkpoint: Option<&Path>) -> Result<()> {
-    let Some(file) = checkpoint else { return output::make_directory(config) };
-    output::check_directory(config, file)?;
-    output::make_directory(config)?;
-    output::take_over(config, file)
+fn prepare(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {
+    if let Some(file) = checkpoint {
+        output::check_directory(config, file)?;
+        output::make_directory(config)?;
+        output::take_over(config, file)?;
+        output::check_beginning(config, global)?;
+    } else {
+        output::make_directory(config)?;
+    }
+    output::clear_future(config, global)
 }
 
 /// A run in progress on one rank.
@@ -144,11 +156,6 @@ impl Run {
     fn new(simulation: Simulation, config: Arc<Config>, signals: Signals, efforts: Efforts) -> Result<Self> {
         let output = RunOutput::new(&simulation, &config, efforts)?;
         let first_step = simulation.global().step;
-        let cleared = match simulation.comm().rank() {
-            0 => output::clear_future(&config, first_step),
-            _ => Ok(()),
-        };
-        agree(simulation.comm(), cleared)?;
         Ok(Self {
             simulation,
             config,
@@ -200,7 +207,8 @@ impl Run {
         let substeps = self.simulation.global().quasi_static.map_or(0, |state| state.substep);
         if let Some(mut report) = self.simulation.test_equilibrium()? {
             let over = self.simulation.settle_stage();
-            let wanted = self.wanted_at_equilibrium(self.increments() > increments, substeps);
+            let reached = self.increments() > increments;
+            let wanted = if reached { self.due_at_equilibrium(substeps) } else { self.wanted() };
             // The last state of all is reported when the run ends.
             if !over && (wanted.sums || wanted.samples) {
                 if wanted.samples {
@@ -220,38 +228,43 @@ impl Run {
         self.simulation.global().quasi_static.map_or(0, |state| state.increments)
     }
 
-    /// What is due at a new equilibrium (`reached`), so many substeps after the one before, or else at the start of a
-    /// stage: the first state of all.
-    fn wanted_at_equilibrium(&self, reached: bool, substeps: u64) -> Wanted {
+    /// What is due at an equilibrium so many substeps after the one before.
+    fn due_at_equilibrium(&self, substeps: u64) -> Wanted {
         let (global, increments) = (self.simulation.global(), self.increments());
         let counted = |every: u64| increments.is_multiple_of(every);
-        let history = match self.config.output.history {
+        let sums = match self.config.output.history {
             Interval::Increments(every) => counted(every),
             // Time stands still, and rows between equilibria would mean nothing.
             Interval::Steps(_) | Interval::Time(_) => true,
         };
-        let snapshot = match self.config.output.snapshots {
+        let samples = match self.config.output.snapshots {
             Some(Interval::Increments(every)) => counted(every),
             Some(every) => is_due(every, global, substeps),
             None => false,
         };
-        Wanted {
-            sums: history && (reached || global.history_rows == 0),
-            samples: snapshot && (reached || global.snapshots == 0),
-        }
+        Wanted { sums, samples }
     }
 
-    /// What is due at the present state, but for what the equilibrium that ended a quasi-static stage here has written. What
-    /// the state says alone decides, so that it is the same after a restart.
-    fn wanted(&self) -> Wanted {
+    /// What is due at a state that a dynamic step has led to.
+    fn due_after_a_step(&self) -> Wanted {
         let global = self.simulation.global();
-        let history = match self.config.output.history {
+        let sums = match self.config.output.history {
             Interval::Increments(_) => is_due(DYNAMIC_HISTORY, global, 1),
             every => is_due(every, global, 1),
         };
-        let snapshot = self.config.output.snapshots.is_some_and(|every| is_due(every, global, 1));
+        Wanted { sums, samples: self.config.output.snapshots.is_some_and(|every| is_due(every, global, 1)) }
+    }
+
+    /// What is due at the present state, which begins a stage or is one of a dynamic stage: by the routine that led to it,
+    /// unless it is written already.
+    fn wanted(&self) -> Wanted {
+        let global = self.simulation.global();
+        let led_here =
+            if global.step == global.stage_start_step { global.stage.checked_sub(1) } else { Some(global.stage) };
+        let relaxed = led_here.is_some_and(|stage| self.config.stages[stage].routine == Routine::QuasiStatic);
+        let due = if relaxed { self.due_at_equilibrium(0) } else { self.due_after_a_step() };
         let [row, shown] = self.output.last_steps().map(|last| last == Some(global.step));
-        Wanted { sums: history && !row, samples: snapshot && !shown }
+        Wanted { sums: due.sums && !row, samples: due.samples && !shown }
     }
 
     fn requests(&self) -> Requests {

@@ -143,12 +143,15 @@ pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initia
             particle.id, particle.species
         )));
     }
-    let Checkpoint { mut global, particles, memory, columns, config_resolved, .. } = checkpoint;
-    begun::check(&config_resolved, &config.resolved, &global)?;
+    let Checkpoint { mut global, mut particles, memory, columns, config_resolved, .. } = checkpoint;
+    let had_ledger = begun::check(&config_resolved, &config.resolved, &global)?;
     let programme = programme(config);
     // A stage that was added to a complete run has not been entered yet.
     if global.step == global.stage_start_step {
         programme.enter(&mut global);
+    }
+    if !had_ledger {
+        begin_ledgers(config, &global, &mut particles);
     }
     if programme.quasi_static_stage(&global).is_some() && global.quasi_static.is_none() {
         return Err(Error::Input(format!(
@@ -217,6 +220,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         max_mass: extremes.max_mass,
         reference_overlap: overlap,
         reference_stiffness: stiffnesses.fold(0.0, |m, k| if k > m { k } else { m }),
+        damped_safety: config.damped_safety(extremes.ellipsoids),
     };
     let walls = config.cell.boundary.map(|boundary| match boundary {
         Boundary::Periodic => None,

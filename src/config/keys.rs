@@ -406,7 +406,12 @@ pub static TIME_STEP: Table = Table {
 static AUTOMATIC: Table = Table {
     meaning: "safety · √(smallest mass / largest contact stiffness).",
     keys: &[
-        key("safety", number(Dimension::NONE, Range::FRACTION), Default::Number(0.17), "Factor β."),
+        key(
+            "safety",
+            number(Dimension::NONE, Range::FRACTION),
+            Default::Number(0.17),
+            "Factor β; dashpots of low restitution lower it, as packings would vibrate otherwise.",
+        ),
         key(
             "reference_overlap",
             number(Dimension::NONE, Range::between(0.0, 1.0)),
@@ -453,8 +458,9 @@ pub static OUTPUT: Table = Table {
             Kind::Flag,
             Default::Flag(false),
             "Keep account of work and dissipation by cause; costs some speed. What is held and dissipated less the work stays \
-             the same to second order in the time step (first with friction; not between ellipsoids, whose force law has no \
-             potential). Plastic contacts that begin overlapping count as pressed in before the first row.",
+             the same up to an error that falls with the time step: at second order between elastic contacts under constant \
+             rates, at first with dashpots, sliding and rates that jump. Not so between ellipsoids, whose force law has no \
+             potential. Plastic contacts that begin overlapping count as pressed in before the first row.",
         ),
         key(
             "orientations",

@@ -215,10 +215,8 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
     let material = material.and_then(|name| find_material(section, "material", &name, materials));
     let size = super::shape::read(section, section.choose("radius").and_then(read_radius));
     let motion = section.choose("motion").and_then(read_motion);
-    let velocity = section.axes("velocity");
-    let velocity_deviation = section.number("velocity_deviation");
-    let spin = section.axes("spin");
-    if matches!(motion, Some(Motion::Driven { .. })) {
+    let driven = matches!(motion, Some(Motion::Driven { .. }));
+    if driven {
         for key in ["velocity", "velocity_deviation", "spin"].into_iter().filter(|key| section.given(key)) {
             section.problem(
                 key,
@@ -227,7 +225,13 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
             );
         }
     }
-    let (radius, shape) = size?;
+    let start = if driven {
+        Some(([0.0; 3], 0.0, [0.0; 3]))
+    } else {
+        let read = (section.axes("velocity"), section.number("velocity_deviation"), section.axes("spin"));
+        read.0.zip(read.1).zip(read.2).map(|((velocity, deviation), spin)| (velocity, deviation, spin))
+    };
+    let ((radius, shape), (velocity, velocity_deviation, spin)) = (size?, start?);
     Some(Species {
         name: name?,
         material: material?,
@@ -235,9 +239,9 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
         shape,
         count: 0,
         motion: motion?,
-        velocity: velocity?,
-        velocity_deviation: velocity_deviation?,
-        spin: spin?,
+        velocity,
+        velocity_deviation,
+        spin,
     })
 }
 

@@ -218,6 +218,7 @@ fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, St
     let stiffest = Meeting::all(config)
         .map(|meeting| (meeting.stiffness(overlap * meeting.radius), meeting.pair.properties.names.join("-")))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let safety = safety.min(config.damped_safety(!config.species.iter().all(Species::is_spherical)));
     (stiffest.0 > 0.0).then(|| (safety * (mass / stiffest.0).sqrt(), stiffest.1))
 }
 

@@ -19,7 +19,7 @@ pub const ENTRY: LawEntry = LawEntry {
     check: |_| Ok(()),
 };
 
-const FACTOR: ParameterSpec = ParameterSpec {
+pub(super) const FACTOR: ParameterSpec = ParameterSpec {
     name: "factor",
     kind: ParameterKind::Number { min: 1e-6, max: 1.0 },
     default: ParameterValue::Number(2.0 / 3.0),

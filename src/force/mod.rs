@@ -20,6 +20,7 @@ pub mod rolling;
 pub mod shear;
 pub mod simd;
 pub mod slider;
+pub mod stability;
 #[cfg(test)]
 mod testing;
 pub mod thornton;

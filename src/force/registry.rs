@@ -186,6 +186,18 @@ impl LawChoice {
         })
     }
 
+    /// The word chosen for the parameter `damping`, if the law has one that takes words.
+    #[must_use]
+    pub fn dashpot(&self) -> Option<&'static str> {
+        let mut parameters = self.law.parameters.iter().zip(&self.values);
+        parameters.find_map(|(parameter, value)| match (parameter.kind, value) {
+            (ParameterKind::Choice(words), ParameterValue::Choice(chosen)) if parameter.name == "damping" => {
+                Some(words[*chosen])
+            }
+            _ => None,
+        })
+    }
+
     /// Value of a number parameter; panics on a name that the law does not declare (our own bug).
     #[must_use]
     pub fn number(&self, name: &str) -> f64 {

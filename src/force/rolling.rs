@@ -26,7 +26,7 @@ const TWISTING_LIMIT: ParameterSpec = ParameterSpec {
     doc: "twisting moment at most mu_tw R_eff F_n (effective_radius) or (2/3) a mu F_n (contact_radius)",
 };
 
-const DAMPING_RATIO: ParameterSpec = ParameterSpec {
+pub(super) const DAMPING_RATIO: ParameterSpec = ParameterSpec {
     name: "damping_ratio",
     kind: ParameterKind::Number { min: 0.0, max: 2.0 },
     default: ParameterValue::Number(0.3),

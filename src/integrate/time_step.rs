@@ -1,4 +1,5 @@
-//! The time step: `Δt = β √(m_min/K_max)`, W (2.8), with K the largest contact stiffness now or soon.
+//! The time step: `Δt = β √(m_min/K_max)`, W (2.8), with K the largest contact stiffness now or soon, and β lowered where
+//! dashpots ask for it.
 
 use crate::config::TimeStepConfig;
 use crate::error::{Error, Result};
@@ -16,6 +17,8 @@ pub struct TimeStepControl {
     pub reference_overlap: f64,
     /// Stiffness of the stiffest pair at the reference overlap \[N/m\]: the floor of K.
     pub reference_stiffness: f64,
+    /// Largest β that the dashpots allow ([`crate::config::Config::damped_safety`]).
+    pub damped_safety: f64,
 }
 
 /// What is measured at a control step.
@@ -49,13 +52,18 @@ impl TimeStepControl {
             TimeStepConfig::Automatic { safety, .. } => safety,
             TimeStepConfig::Fixed(_) => 0.17,
         };
+        safety.min(self.damped_safety) * self.of_stiffness(measured)
+    }
+
+    /// √(m_min/K_max) \[s\].
+    fn of_stiffness(&self, measured: Measured) -> f64 {
         let mut stiffness = self.reference_stiffness;
         for other in [measured.max_stiffness, self.impact_stiffness(measured.max_speed)] {
             if other > stiffness {
                 stiffness = other;
             }
         }
-        safety * (self.min_mass / stiffness).sqrt()
+        (self.min_mass / stiffness).sqrt()
     }
 
     /// The step to use until the next control step \[s\], and a warning about a large fixed one.
@@ -65,7 +73,7 @@ impl TimeStepControl {
     pub fn choose(&self, measured: Measured, step: u64) -> Result<(f64, Option<String>)> {
         let automatic = self.automatic(measured);
         let TimeStepConfig::Fixed(fixed) = self.config else { return Ok((automatic, None)) };
-        let limit = 2.0 / 0.17 * automatic;
+        let limit = 2.0 * self.of_stiffness(measured);
         if fixed > limit {
             return Err(Error::Simulation {
                 step,

@@ -214,6 +214,19 @@ impl HistoryWriter {
 /// # Errors
 /// [`Error::File`] when the table is missing, is not ours, or holds fewer rows.
 pub fn truncate(directory: &Path, rows: u64) -> Result<()> {
+    write_atomically(&path_in(directory), first_rows(directory, rows)?.as_bytes())
+}
+
+/// That the table holds so many rows. Rank 0 only.
+///
+/// # Errors
+/// As [`truncate`].
+pub fn check(directory: &Path, rows: u64) -> Result<()> {
+    if rows == 0 { Ok(()) } else { first_rows(directory, rows).map(|_| ()) }
+}
+
+/// The header and the first `rows` rows.
+fn first_rows(directory: &Path, rows: u64) -> Result<String> {
     let path = path_in(directory);
     let text = read_text(&path)?;
     let wanted = usize::try_from(rows).unwrap_or(usize::MAX).saturating_add(1);
@@ -226,7 +239,7 @@ pub fn truncate(directory: &Path, rows: u64) -> Result<()> {
         );
         return Err(Error::File { path, message });
     }
-    write_atomically(&path, lines.concat().as_bytes())
+    Ok(lines.concat())
 }
 
 /// All rows of the table of a run directory; a last line cut off by a kill is left out.

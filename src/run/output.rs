@@ -8,11 +8,11 @@ use crate::exchange::agree;
 use crate::force::observe::Wanted;
 use crate::output::checkpoint;
 use crate::output::digest::Digest;
-use crate::output::history::HistoryWriter;
+use crate::output::history::{self, HistoryWriter};
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
 use crate::output::plot;
 use crate::output::ranks::{effort_table, rank_table};
-use crate::output::snapshot::{Moment, SnapshotSeries, Style};
+use crate::output::snapshot::{self, Moment, SnapshotSeries, Style};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
 use std::fs;
@@ -42,19 +42,31 @@ pub fn make_directory(config: &Config) -> Result<()> {
     fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, &error))
 }
 
-/// Rank 0 writes the resolved input, and clears away what belongs to a future that is computed anew from `step`: later
-/// checkpoints, and the end of an earlier run.
+/// Rank 0: the directory holds the rows and snapshots that the state counts.
+///
+/// # Errors
+/// It does not.
+pub fn check_beginning(config: &Config, global: &GlobalState) -> Result<()> {
+    let directory = &config.output.directory;
+    history::check(directory, global.history_rows)?;
+    config.output.snapshots.map_or(Ok(()), |_| snapshot::check(directory, global.snapshots))
+}
+
+/// Rank 0 writes the resolved input, and clears away what belongs to a future that is computed anew from this state: later
+/// checkpoints first, as a restart from them would miss what goes next; the end of an earlier run; and snapshots, where
+/// none are wanted.
 ///
 /// # Errors
 /// The directory cannot be written.
-pub fn clear_future(config: &Config, step: u64) -> Result<()> {
+pub fn clear_future(config: &Config, global: &GlobalState) -> Result<()> {
     let directory = &config.output.directory;
     let path = directory.join("config.resolved.toml");
     fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, &error))?;
+    checkpoint::discard_after(directory, global.step)?;
     for path in ends_of_earlier_runs(directory) {
         fs::remove_file(&path).map_err(|error| failed("remove the old file", &path, &error))?;
     }
-    checkpoint::discard_after(directory, step)
+    if config.output.snapshots.is_some() { Ok(()) } else { snapshot::discard_after(directory, global.snapshots) }
 }
 
 /// Rank 0: a restart goes on in the directory of its checkpoint or begins one in which no run has written.
@@ -105,16 +117,18 @@ pub fn take_over(config: &Config, checkpoint: &Path) -> Result<()> {
             ),
         })
     };
-    copied(&from.join("history.csv"), &to.join("history.csv"))?;
-    let Ok(entries) = fs::read_dir(from.join("snapshots")) else { return Ok(()) };
-    fs::create_dir_all(to.join("snapshots")).map_err(|error| Error::File {
-        path: to.join("snapshots"),
-        message: format!("cannot make the folder ({error}); choose another output.directory"),
-    })?;
-    for entry in entries.flatten() {
-        copied(&entry.path(), &to.join("snapshots").join(entry.file_name()))?;
+    if let Ok(entries) = fs::read_dir(from.join("snapshots")) {
+        let folder = to.join("snapshots");
+        fs::create_dir_all(&folder).map_err(|error| failed("make the folder", &folder, &error))?;
+        for entry in entries.flatten().filter(|entry| entry.path().is_file()) {
+            copied(&entry.path(), &folder.join(entry.file_name()))?;
+        }
     }
-    Ok(())
+    // Last and at once: what holds a table counts as a run.
+    let part = to.join("history.csv.part");
+    copied(&from.join("history.csv"), &part)?;
+    let table = to.join("history.csv");
+    fs::rename(&part, &table).map_err(|error| failed("write the table", &table, &error))
 }
 
 /// Status file and post-mortem files in a run directory.
@@ -132,6 +146,7 @@ pub struct RunOutput {
     log: Option<Log>,
     inertia: Inertia,
     efforts: Efforts,
+    /// Steps of the last row and the last snapshot that this process wrote.
     last: [Option<u64>; 2],
 }
 
@@ -150,10 +165,13 @@ impl RunOutput {
             (true, rows) => HistoryWriter::resume(directory, rows).map(Some),
         };
         let history = agree(comm, opened)?;
-        // Without snapshots too: those of an earlier run, or of a future that is computed anew, go.
-        let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
-        let snapshots = SnapshotSeries::resume(comm, directory, global.snapshots, style)?;
-        let snapshots = config.output.snapshots.is_some().then_some(snapshots);
+        let snapshots = match config.output.snapshots {
+            Some(_) => {
+                let style = Style { ellipsoids: simulation.model().ellipsoids, dump: config.output.dump };
+                Some(SnapshotSeries::resume(comm, directory, global.snapshots, style)?)
+            }
+            None => None,
+        };
         Ok(Self {
             config: Arc::clone(config),
             history,

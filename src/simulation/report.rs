@@ -218,12 +218,12 @@ impl Simulation {
         sum
     }
 
-    /// Refuse a fixed time step that the present state makes unstable.
+    /// Refuse a fixed time step that the present state makes unstable, if the first step is one that looks.
     ///
     /// # Errors
     /// As [`crate::integrate::time_step::TimeStepControl::choose`]; the same on every rank.
     pub fn check_fixed_time_step(&mut self) -> Result<()> {
-        if self.is_quasi_static() || !matches!(self.model.config.time_step, TimeStepConfig::Fixed(_)) {
+        if !self.control_is_due() || !matches!(self.model.config.time_step, TimeStepConfig::Fixed(_)) {
             return Ok(());
         }
         let measured = self.observe(Wanted::default())?.measured;

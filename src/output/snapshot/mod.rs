@@ -171,16 +171,38 @@ impl SnapshotSeries {
     }
 }
 
+/// That a run directory holds the first `count` snapshots. Rank 0.
+///
+/// # Errors
+/// [`crate::error::Error::File`] when it does not.
+pub fn check(directory: &Path, count: u64) -> Result<()> {
+    moments_of(&directory.join("snapshots"), count).map(|_| ())
+}
+
+/// Remove all snapshots of a run directory but the first `count`; none if those are not there. Rank 0.
+///
+/// # Errors
+/// [`crate::error::Error::File`] when one cannot be removed.
+pub fn discard_after(directory: &Path, count: u64) -> Result<()> {
+    let folder = directory.join("snapshots");
+    if moments_of(&folder, count).is_err() { Ok(()) } else { keep_first(&folder, count).map(|_| ()) }
+}
+
+/// The moments of the first `count` snapshots.
+fn moments_of(folder: &Path, count: u64) -> Result<Vec<Moment>> {
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    index::check_length(folder, count)?;
+    (0..count).map(|number| vtkhdf::read_moment(&folder.join(index::particle_file(number)))).collect()
+}
+
 /// Remove all snapshots but the first `count` and return the moments of those. Rank 0.
 fn keep_first(folder: &Path, count: u64) -> Result<Vec<Moment>> {
-    let count = usize::try_from(count).unwrap_or(usize::MAX);
     if !folder.exists() && count == 0 {
         return Ok(Vec::new());
     }
     create_folder(folder)?;
-    index::check_length(folder, count)?;
-    let moment = |number| vtkhdf::read_moment(&folder.join(index::particle_file(number)));
-    let moments: Vec<Moment> = (0..count).map(moment).collect::<Result<_>>()?;
+    let moments = moments_of(folder, count)?;
+    let count = moments.len();
     let entries = fs::read_dir(folder).map_err(|error| io_error(folder, "read the folder", &error))?;
     for entry in entries.flatten() {
         let name = entry.file_name();

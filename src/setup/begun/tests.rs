@@ -5,6 +5,7 @@ use crate::state::GlobalState;
 const INPUT: &str = "seed = 1\n[packing.random_close]\ncontraction_rate = 0.001\n[cell]\nsolid_fraction = 0.6\n\
     [[species]]\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
     [[stage]]\nstrain_rate = [0.0, 0.0, 1.0]\nduration = 1.0\n[[stage]]\nstrain_rate = [0.0, 0.0, -1.0]\nsteps = 5\n\
+    [stage.stress.x]\ntarget = 5.0\nmax_rate = 1.0\n[load]\nkinematics = \"BC\"\n\
     [output]\nhistory = \"10 steps\"\n";
 
 /// In `stage`, `steps` steps after it began.
@@ -26,6 +27,7 @@ fn what_a_run_begins_with_cannot_change() {
         ("seed = 1", "seed = 2", "seed is 2 and was 1"),
         ("contraction_rate = 0.001", "contraction_rate = 0.002", "packing.random_close.contraction_rate"),
         ("solid_fraction = 0.6", "sides = [1.0, 1.0, 1.0]", "cell.solid_fraction is gone and was 0.6"),
+        ("\"BC\"", "\"BCT\"", "load.kinematics"),
     ] {
         let message = refused(from, to, &state(0, 7)).unwrap();
         assert!(message.contains(named), "{message}");
@@ -42,6 +44,19 @@ fn a_stage_that_has_begun_strains_as_it_did() {
     assert_eq!(refused(later.0, later.1, &state(0, 7)), None);
     assert_eq!(refused(later.0, later.1, &state(1, 0)), None);
     assert!(refused(later.0, later.1, &state(1, 1)).unwrap().contains("stage.1.strain_rate"));
+    // Another axis, or none, steered by a stress.
+    for (from, to) in [("stage.stress.x", "stage.stress.y"), ("stage.stress.x", "output.some")] {
+        assert!(refused(from, to, &state(1, 1)).unwrap().contains("stage.1.stress"));
+        assert_eq!(refused(from, to, &state(0, 7)), None);
+    }
+    assert_eq!(refused("target = 5.0", "target = 6.0", &state(1, 1)), None);
+}
+
+#[test]
+fn whether_there_was_a_ledger() {
+    let with = INPUT.replace("[output]\n", "[output]\nenergy_ledger = true\n");
+    assert_eq!(check(INPUT, &with, &state(0, 7)).unwrap(), false);
+    assert_eq!(check(&with, INPUT, &state(0, 7)).unwrap(), true);
 }
 
 #[test]
