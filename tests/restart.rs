@@ -206,12 +206,12 @@ fn rows_keep_a_changed_interval_after_a_restart() {
 }
 
 #[test]
-fn rows_keep_their_interval_after_a_quasi_static_stage() {
+fn rows_keep_their_interval_around_a_quasi_static_stage() {
     let directory = scratch("after_quasi_static");
     let config = directory.join("mixed.toml");
     let input = "[[material]]\nname = \"m\"\ndensity = 2500\nyoung_modulus = \"1 GPa\"\npoisson_ratio = 0.25\n\
                  restitution = 0.5\n[[species]]\nname = \"s\"\nmaterial = \"m\"\nradius = \"1 mm\"\ncount = 40\n\
-                 [contact.normal.hertz]\n[[stage]]\nroutine = \"quasi_static\"\nstrain_increment = { z = \"0.05 %\" }\n\
+                 [contact.normal.hertz]\n[[stage]]\nhold = true\nsteps = 100\n[[stage]]\nroutine = \"quasi_static\"\nstrain_increment = { z = \"0.05 %\" }\n\
                  increments = 3\n[[stage]]\nstrain_rate = { z = \"0.1 1/s\" }\nsteps = 230\n\
                  [output]\nhistory = \"50 steps\"\nsnapshots = \"100 steps\"\nplots = false\n";
     std::fs::write(&config, input).expect("the build folder can be written");
@@ -219,10 +219,11 @@ fn rows_keep_their_interval_after_a_quasi_static_stage() {
     let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &run_directory, &[]);
     assert!(output.status.success(), "{}", text(&output));
     let steps = steps_of(&run_directory);
-    // The first state and three equilibria, the last of which is the dynamic stage's first state.
-    let (start, end) = (steps[3], steps[3] + 230);
+    // A dynamic stage and three equilibria, the last of which is the second dynamic stage's first state.
+    assert_eq!(steps[..3], [0, 50, 100]);
+    let (start, end) = (steps[5], steps[5] + 230);
     let multiples = (start + 1..end).filter(|step| step % 50 == 0);
-    let expected: Vec<u64> = steps[..4].iter().copied().chain(multiples).chain([end]).collect();
+    let expected: Vec<u64> = steps[..6].iter().copied().chain(multiples).chain([end]).collect();
     assert_eq!(steps, expected);
-    assert!(snapshots(&run_directory) >= 4, "{}", snapshots(&run_directory));
+    assert!(snapshots(&run_directory) >= 5, "{}", snapshots(&run_directory));
 }

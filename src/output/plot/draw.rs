@@ -17,6 +17,14 @@ pub struct Curve {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Curve {
+    /// Some point can be drawn.
+    #[must_use]
+    pub fn shows(&self) -> bool {
+        self.points.iter().any(finite)
+    }
+}
+
 const SIZE: (u32, u32) = (1200, 800);
 /// Pixels of a PNG per unit of [`SIZE`]: lines have whole-pixel corners, which show at one.
 const PNG_SCALE: u32 = 2;
@@ -133,7 +141,13 @@ fn chart<B: DrawingBackend>(
                 let dot = |point: &(f64, f64)| Circle::new(*point, size(6), colour.filled());
                 chart.draw_series(run.iter().map(dot)).map_err(text)?;
             }
-            let series = chart.draw_series(LineSeries::new(run.iter().copied(), style)).map_err(text)?;
+            // Thick polylines of bitmaps have long spikes where a curve turns back; pictures of bitmaps are scaled.
+            let series = if scale > 1 && run.len() > 1 {
+                let pieces = run.windows(2).map(|ends| PathElement::new(ends.to_vec(), style));
+                chart.draw_series(pieces).map_err(text)?
+            } else {
+                chart.draw_series(LineSeries::new(run.iter().copied(), style)).map_err(text)?
+            };
             if let Some(label) = label.take() {
                 let length = size(34) as i32;
                 series.label(label).legend(move |(x, y)| PathElement::new(vec![(x, y), (x + length, y)], style));

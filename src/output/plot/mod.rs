@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// factors already applied.
 struct Figure {
     name: &'static str,
-    title: &'static str,
+    title: String,
     x_label: String,
     y_label: String,
     curves: Vec<Curve>,
@@ -41,62 +41,87 @@ pub fn plot_run(directory: &Path) -> Result<Vec<PathBuf>> {
     for figure in figures(&rows) {
         for ending in ["svg", "png"] {
             let path = folder.join(format!("{}.{ending}", figure.name));
-            draw_curves(&path, figure.title, &figure.x_label, &figure.y_label, &figure.curves)?;
+            draw_curves(&path, &figure.title, &figure.x_label, &figure.y_label, &figure.curves)?;
             files.push(path);
         }
     }
     Ok(files)
 }
 
-fn figures(rows: &[HistoryRow]) -> Vec<Figure> {
-    let stress = scale_of(rows.iter().flat_map(|row| [row.stress[2], row.mean_stress()]), "Pa");
-    let time = scale_of(rows.iter().map(|row| row.time), "s");
-    let axis = loaded_axis(rows);
-    let strain_label = format!("nominal strain {} / %", ["xx", "yy", "zz"][axis]);
-    let time_label = format!("time / {}", time.unit);
-    let strain = |row: &HistoryRow| 100.0 * row.strain[axis];
-    let seconds = |row: &HistoryRow| time.factor * row.time;
-    let zz = |row: &HistoryRow| stress.factor * row.stress[2];
-    let mean = |row: &HistoryRow| stress.factor * row.mean_stress();
-    let stress_label = format!("stress / {}", stress.unit);
-    let mut figures = vec![
-        Figure {
-            name: "stress_strain",
-            title: "Stress over strain",
-            x_label: strain_label.clone(),
-            y_label: stress_label.clone(),
-            curves: vec![curve("zz", rows, strain, zz), curve("mean", rows, strain, mean)],
-        },
-        Figure {
-            name: "stress_time",
-            title: "Stress over time",
-            x_label: time_label.clone(),
-            y_label: stress_label,
-            curves: vec![curve("zz", rows, seconds, zz), curve("mean", rows, seconds, mean)],
-        },
-    ];
-    figures.push(Figure {
-        name: "coordination",
-        title: "Coordination number over strain",
-        x_label: strain_label.clone(),
-        y_label: "coordination number".to_owned(),
-        curves: vec![
-            curve("all particles", rows, strain, |row| row.coordination),
-            curve("without rattlers", rows, strain, |row| row.coordination_without_rattlers),
-        ],
-    });
-    figures.push(Figure {
-        name: "solid_fraction",
-        title: "Solid fraction over strain",
-        x_label: strain_label,
-        y_label: "solid fraction".to_owned(),
-        curves: vec![curve("solid fraction", rows, strain, |row| row.solid_fraction)],
-    });
-    figures.push(energies(rows, &time_label, seconds));
-    figures
+/// What stands along the x axis: its name in titles, its label, and the number of a row.
+struct Abscissa {
+    name: &'static str,
+    label: String,
+    value: Box<dyn Fn(&HistoryRow) -> f64>,
 }
 
-fn energies(rows: &[HistoryRow], time_label: &str, seconds: impl Fn(&HistoryRow) -> f64 + Copy) -> Figure {
+impl Abscissa {
+    /// Time, or where it stands still the increments.
+    fn of_progress(rows: &[HistoryRow]) -> Self {
+        if rows.iter().all(|row| row.time == rows[0].time) {
+            let value = Box::new(|row: &HistoryRow| row.increment as f64);
+            return Self { name: "increments", label: "increment".to_owned(), value };
+        }
+        let time = scale_of(rows.iter().map(|row| row.time), "s");
+        Self {
+            name: "time",
+            label: format!("time / {}", time.unit),
+            value: Box::new(move |row| time.factor * row.time),
+        }
+    }
+
+    /// The strain of the axis, or of a cell that keeps its shape as [`Self::of_progress`].
+    fn of_strain(rows: &[HistoryRow], axis: usize) -> Self {
+        if rows.iter().all(|row| row.strain == rows[0].strain) {
+            return Self::of_progress(rows);
+        }
+        Self {
+            name: "strain",
+            label: format!("nominal strain {} / %", AXES[axis]),
+            value: Box::new(move |row| 100.0 * row.strain[axis]),
+        }
+    }
+}
+
+const AXES: [&str; 3] = ["xx", "yy", "zz"];
+
+fn figures(rows: &[HistoryRow]) -> Vec<Figure> {
+    let axis = loaded_axis(rows);
+    let stress = scale_of(rows.iter().flat_map(|row| [row.stress[axis], row.mean_stress()]), "Pa");
+    let (progress, strain) = (Abscissa::of_progress(rows), Abscissa::of_strain(rows, axis));
+    let figure = |name, what: &str, over: &Abscissa, y_label: &str, curves| Figure {
+        name,
+        title: format!("{what} over {}", over.name),
+        x_label: over.label.clone(),
+        y_label: y_label.to_owned(),
+        curves,
+    };
+    let stress_label = format!("stress / {}", stress.unit);
+    let stresses = |over: &Abscissa| {
+        vec![
+            curve(AXES[axis], rows, &over.value, |row| stress.factor * row.stress[axis]),
+            curve("mean", rows, &over.value, |row| stress.factor * row.mean_stress()),
+        ]
+    };
+    let coordination = vec![
+        curve("all particles", rows, &strain.value, |row| row.coordination),
+        curve("without rattlers", rows, &strain.value, |row| row.coordination_without_rattlers),
+    ];
+    let solid_fraction = vec![curve("solid fraction", rows, &strain.value, |row| row.solid_fraction)];
+    let (energies, unit) = energies(rows, &progress);
+    let figures = [
+        figure("stress_strain", "Stress", &strain, &stress_label, stresses(&strain)),
+        figure("stress_time", "Stress", &progress, &stress_label, stresses(&progress)),
+        figure("coordination", "Coordination number", &strain, "coordination number", coordination),
+        figure("solid_fraction", "Solid fraction", &strain, "solid fraction", solid_fraction),
+        figure("energies", "Energies", &progress, &format!("energy / {unit}"), energies),
+    ];
+    // A gas at rest has no energies to show.
+    figures.into_iter().filter(|figure| figure.curves.iter().any(Curve::shows)).collect()
+}
+
+/// Curves of the energies that are not zero throughout, and their unit.
+fn energies(rows: &[HistoryRow], over: &Abscissa) -> (Vec<Curve>, String) {
     type Energy = (String, Box<dyn Fn(&HistoryRow) -> f64>);
     let mut all: Vec<Energy> = vec![
         ("kinetic".to_owned(), Box::new(|row| row.kinetic)),
@@ -110,14 +135,8 @@ fn energies(rows: &[HistoryRow], time_label: &str, seconds: impl Fn(&HistoryRow)
     let used: Vec<Energy> = all.into_iter().filter(|(_, value)| rows.iter().any(|row| value(row) != 0.0)).collect();
     let energy = scale_of(rows.iter().flat_map(|row| used.iter().map(|(_, value)| value(row))), "J");
     let curves =
-        used.iter().map(|(name, value)| curve(name, rows, seconds, |row| energy.factor * value(row))).collect();
-    Figure {
-        name: "energies",
-        title: "Energies over time",
-        x_label: time_label.to_owned(),
-        y_label: format!("energy / {}", energy.unit),
-        curves,
-    }
+        used.iter().map(|(name, value)| curve(name, rows, &over.value, |row| energy.factor * value(row))).collect();
+    (curves, energy.unit)
 }
 
 fn curve(label: &str, rows: &[HistoryRow], x: impl Fn(&HistoryRow) -> f64, y: impl Fn(&HistoryRow) -> f64) -> Curve {
@@ -205,6 +224,31 @@ mod tests {
                 std::fs::copy(file, Path::new(&kept).join(file.file_name().unwrap_or_default())).expect("copy");
             }
         }
+    }
+
+    fn titles(change: impl Fn(u64, &mut HistoryRow)) -> Vec<String> {
+        let rows = (0..9).map(|step| {
+            let mut row =
+                HistoryRow { step, time: step as f64, stress: [1.0; 6], elastic: 1.0, ..HistoryRow::default() };
+            change(step, &mut row);
+            row
+        });
+        figures(&rows.collect::<Vec<_>>())
+            .into_iter()
+            .map(|figure| format!("{}: {}", figure.title, figure.x_label))
+            .collect()
+    }
+
+    #[test]
+    fn what_does_not_change_is_no_axis_and_what_is_not_there_no_picture() {
+        let strained = titles(|step, row| row.strain[0] = 1e-3 * step as f64);
+        assert_eq!(strained[0], "Stress over strain: nominal strain xx / %");
+        assert_eq!(strained[4], "Energies over time: time / s");
+        let held = titles(|_, _| ());
+        assert_eq!((held[0].as_str(), held.len()), ("Stress over time: time / s", 5));
+        let relaxed = titles(|step, row| (row.time, row.increment) = (0.0, step));
+        assert_eq!(relaxed[4], "Energies over increments: increment");
+        assert_eq!(titles(|_, row| row.elastic = 0.0).len(), 4);
     }
 
     #[test]

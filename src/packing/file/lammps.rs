@@ -80,6 +80,7 @@ pub fn read(path: &Path, species: &[&str], region: &Region) -> Result<Contents, 
         section = reader.next()?.map(str::to_owned);
     }
     if !has_atoms {
+        atoms.problems.into_result(())?;
         return Err("there is no section Atoms; the file is not complete, write it again".into());
     }
     let Atoms { cell, rows, problems, .. } = atoms;

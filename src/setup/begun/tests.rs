@@ -55,8 +55,8 @@ fn a_stage_that_has_begun_strains_as_it_did() {
 #[test]
 fn whether_there_was_a_ledger() {
     let with = INPUT.replace("[output]\n", "[output]\nenergy_ledger = true\n");
-    assert_eq!(check(INPUT, &with, &state(0, 7)).unwrap(), false);
-    assert_eq!(check(&with, INPUT, &state(0, 7)).unwrap(), true);
+    assert!(!check(INPUT, &with, &state(0, 7)).unwrap());
+    assert!(check(&with, INPUT, &state(0, 7)).unwrap());
 }
 
 #[test]

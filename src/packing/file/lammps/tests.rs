@@ -157,3 +157,9 @@ fn many_problems_are_told_at_once() {
     let text = GOOD.replace("1800", "0");
     assert_refused(&text, &["line 14: density 0", "line 16: density 0"]);
 }
+
+#[test]
+fn a_section_before_the_atoms_is_named_and_not_said_to_be_their_lack() {
+    let text = GOOD.replace("Atoms  # sphere", "Masses\n\n1 1800\n\nAtoms  # sphere");
+    assert_refused(&text, &["\"Masses\" begins no section", "line 12"]);
+}
