@@ -2,12 +2,9 @@
 
 mod quasi_static;
 
-use crate::config::{AxisControl, Kinematics, Routine, Stage};
+use crate::config::{AxisControl, Kinematics, MAX_STRAIN_PER_STEP, Routine, Stage};
 use crate::state::GlobalState;
 use quasi_static::{enter_quasi_static, is_over_quasi_static, next_equilibrium_strain};
-
-/// Largest change of nominal strain per step: the contacts must follow the load in small increments.
-pub const MAX_STRAIN_PER_STEP: f64 = 1e-5;
 
 /// What one step does to time and cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -401,6 +401,9 @@ pub enum Interval {
     Increments(u64),
 }
 
+/// Largest change of nominal strain per step: the contacts must follow the load in small increments.
+pub const MAX_STRAIN_PER_STEP: f64 = 1e-5;
+
 /// Most threads that a rank may have.
 pub const MAX_THREADS: u16 = 1024;
 

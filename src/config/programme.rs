@@ -12,13 +12,17 @@ pub(super) struct Progress {
     pub increments: f64,
     /// All stages so far have a known length.
     pub complete: bool,
+    /// Steps of the stages that end by a number of steps alone.
+    pub steps: f64,
+    /// All stages so far have a known length or number of steps.
+    pub countable: bool,
     /// Strain per axis; `None` once a servo or an unknown length made it unknown.
     pub strain: [Option<f64>; 3],
 }
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { time: 0.0, increments: 0.0, complete: true, strain: [Some(0.0); 3] }
+        Self { time: 0.0, increments: 0.0, complete: true, steps: 0.0, countable: true, strain: [Some(0.0); 3] }
     }
 }
 
@@ -26,6 +30,7 @@ impl Progress {
     /// Nothing is known any more.
     pub fn lose_track(&mut self) {
         self.complete = false;
+        self.countable = false;
         self.strain = [None; 3];
     }
 }
@@ -51,6 +56,9 @@ pub(super) fn advance(progress: &mut Progress, stage: &Stage) {
         Routine::QuasiStatic => progress.increments += duration.unwrap_or(0.0).ceil(),
     }
     progress.complete &= duration.is_some() && certain;
+    let counted = stage.steps.filter(|_| duration.is_none());
+    progress.steps += counted.map_or(0.0, |steps| steps as f64);
+    progress.countable &= stage.until_stress.is_none() && (counted.is_some() || duration.is_some() && certain);
     for (strain, control) in progress.strain.iter_mut().zip(stage.axes) {
         *strain = match (control, duration) {
             (AxisControl::StrainRate(0.0), _) => *strain,

@@ -5,7 +5,9 @@ mod quasi_static;
 
 use super::programme::{Progress, advance};
 use super::settings::RANDOM_CLOSE;
-use super::{AxisControl, Config, Material, PackingConfig, PairConfig, Routine, Species, TimeStepConfig};
+use super::{
+    AxisControl, Config, MAX_STRAIN_PER_STEP, Material, PackingConfig, PairConfig, Routine, Species, TimeStepConfig,
+};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -211,15 +213,20 @@ impl<'a> Meeting<'a> {
     }
 }
 
-/// `β √(m_min/K_max)` at this overlap over radius, and the pair that sets K.
-fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, String)> {
+/// `√(m_min/K_max)` at this overlap over radius \[s\], and the pair that sets K.
+fn contact_time(config: &Config, overlap: f64) -> Option<(f64, String)> {
     let mass =
         config.species.iter().map(|s| smallest_mass(s, &config.materials[s.material])).fold(f64::INFINITY, f64::min);
     let stiffest = Meeting::all(config)
         .map(|meeting| (meeting.stiffness(overlap * meeting.radius), meeting.pair.properties.names.join("-")))
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (stiffest.0 > 0.0).then(|| ((mass / stiffest.0).sqrt(), stiffest.1))
+}
+
+/// The automatic time step at this overlap over radius \[s\], and the pair that limits it.
+fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, String)> {
     let safety = safety.min(config.damped_safety(!config.species.iter().all(Species::is_spherical)));
-    (stiffest.0 > 0.0).then(|| (safety * (mass / stiffest.0).sqrt(), stiffest.1))
+    contact_time(config, overlap).map(|(time, pair)| (safety * time, pair))
 }
 
 fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
@@ -310,10 +317,14 @@ fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
     let length = if estimate.progress.complete { "" } else { "at least " };
     let time = estimate.progress.time;
     table.row("time of all stages", format!("{length}{}", quantity(time, "s")));
-    let steps = match config.time_step {
-        TimeStepConfig::Fixed(step) => vec![time / step],
-        TimeStepConfig::Automatic { .. } => steps_at.iter().flatten().map(|(_, _, step, _)| time / step).collect(),
+    // The strain of one step is bounded too.
+    let most = if estimate.rate > 0.0 { MAX_STRAIN_PER_STEP / estimate.rate } else { f64::INFINITY };
+    let count = |step: f64| estimate.progress.steps + if time > 0.0 { time / step.min(most) } else { 0.0 };
+    let steps: Vec<f64> = match config.time_step {
+        TimeStepConfig::Fixed(step) => vec![count(step)],
+        TimeStepConfig::Automatic { .. } => steps_at.iter().flatten().map(|(_, _, step, _)| count(*step)).collect(),
     };
+    let length = if estimate.progress.countable { "" } else { "at least " };
     let counts: Vec<String> = steps.iter().map(|count| format!("{count:.2e}")).collect();
     table.row("steps", format!("{length}{}", counts.join(" to ")));
 }
@@ -395,10 +406,12 @@ fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
         (config.time_step, automatic_step(config, 0.17, estimate.overlap.max(1e-3)))
         && step > automatic
     {
+        let limit = contact_time(config, 1e-3).map_or(f64::INFINITY, |(time, _)| 2.0 * time);
         warnings.push(format!(
-            "the fixed time step {} is larger than the automatic one, {}",
+            "the fixed time step {} is larger than the automatic one, {}{}",
             quantity(step, "s"),
-            quantity(automatic, "s")
+            quantity(automatic, "s"),
+            if step > limit { "; it is unstable, and the run will refuse it" } else { "" }
         ));
     }
     let held = config.species.iter().any(|s| matches!(s.motion, super::Motion::Driven { .. }));
@@ -446,8 +459,22 @@ mod tests {
         let calm = sheet(&config("quickstart.toml", &[]));
         assert!(!calm.contains("warning"), "{calm}");
         let fast = sheet(&config("quickstart.toml", &["stage.0.strain_rate={z=0.2}", "time_step=\"1 s\""]));
-        for part in ["lower density_scaling", "contact.max_overlap_fraction", "larger than the automatic one"] {
+        for part in
+            ["lower density_scaling", "contact.max_overlap_fraction", "larger than the automatic one", "unstable"]
+        {
             assert!(fast.contains(part), "{fast}");
         }
+    }
+
+    #[test]
+    fn steps_are_counted_as_far_as_they_are_known() {
+        let steps = |overrides: &[&str]| {
+            let sheet = sheet(&config("two_spheres.toml", overrides));
+            let line = sheet.lines().find(|line| line.trim_start().starts_with("steps ")).unwrap().to_owned();
+            line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(steps(&["stage=[{hold=true, steps=3000}, {hold=true, steps=500}]"]), "3.50e3");
+        // 0.001 strain in steps of at most 1e-5.
+        assert_eq!(steps(&["stage=[{strain_rate={z=1e6}, until_strain={z=0.001}}]"]), "1.00e2 to 1.00e2");
     }
 }
