@@ -67,7 +67,7 @@ fn too_large_displacements_stop_every_rank_with_one_message_that_does_not_depend
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         let lines: Vec<String> = stderr.lines().filter(|line| line.contains("overlap by")).map(str::to_owned).collect();
         assert_eq!(lines.len(), 1, "{stderr}");
-        assert!(lines[0].contains("lower packing.perturbation"), "{stderr}");
+        assert!(lines[0].contains("packing.random_close.perturbation"), "{stderr}");
         messages.extend(lines);
     }
     assert!(messages.iter().all(|message| *message == messages[0]), "{messages:?}");
