@@ -186,7 +186,7 @@ impl Simulation {
             let mass = self.mass(index);
             (1, power(self.model.config.gravity.map(|g| mass * g)) * half)
         } else {
-            (2, -power(self.contact_force(index)) * half)
+            (2, -power(self.plus_contact_forces([0.0; 3], index)) * half)
         }
     }
 
@@ -202,13 +202,12 @@ impl Simulation {
 
     /// Sum of all forces on an owned particle at the last look at single contacts \[N\].
     fn net_force(&self, particle: usize) -> [f64; 3] {
-        let (mass, contact) = (self.mass(particle), self.contact_force(particle));
-        std::array::from_fn(|k| mass * self.model.config.gravity[k] + contact[k])
+        let mass = self.mass(particle);
+        self.plus_contact_forces(self.model.config.gravity.map(|g| mass * g), particle)
     }
 
-    /// Sum of its contact forces \[N\].
-    fn contact_force(&self, particle: usize) -> [f64; 3] {
-        let mut sum = [0.0; 3];
+    /// A force and its contact forces after it \[N\].
+    fn plus_contact_forces(&self, mut sum: [f64; 3], particle: usize) -> [f64; 3] {
         for (line, is_second) in self.contacts.lines_of(particle) {
             let sign = if is_second { -1.0 } else { 1.0 };
             for (total, force) in sum.iter_mut().zip(self.forces[line]) {
