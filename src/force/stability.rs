@@ -7,7 +7,7 @@ use super::rolling::DAMPING_RATIO;
 use crate::config::{Config, PairConfig};
 
 /// Contacts of a particle in the motions that are braked most, of spheres and of ellipsoids: a little more than the mean
-/// of dense packings. With the first the onset of vibrations comes out as seen in packings of 200 spheres, to 3 % of Δt.
+/// of dense packings. With the first the onset of vibrations lies where packings of 200 spheres were seen to begin (see tests).
 const COORDINATION: [f64; 2] = [6.4, 9.5];
 
 /// Most that dashpots may brake in a step, γ Δt; at 1 packings vibrate.
