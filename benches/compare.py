@@ -1,13 +1,17 @@
 #!/usr/bin/env python3
-"""Compare programs on a core that nobody else uses.
+"""Compare programs on cores that nobody else uses.
 
-    python3 benches/compare.py SECONDS "BENCH ARGUMENTS" "PROGRAM [MORE ARGUMENTS]" ...
+    python3 benches/compare.py SECONDS "[NAME=][CORES*]COMMAND" ...
 
-Runs `PROGRAM bench BENCH ARGUMENTS MORE ARGUMENTS` of each in turn, bound to one core, for so many seconds, and prints
-quartiles of the particle-steps/s and the ratio of the medians to the first program's. On a shared machine somebody else may run on
-the core's other hardware thread, which takes up to half of its speed. A loop of one short instruction and a jump, which
-then takes two cycles a turn instead of one, tells: runs count only if it was fast right before and right after.
-Needs a C compiler (cc) and Linux.
+Runs the commands in turn, each bound to one core or as many as it names, for so many seconds, and prints quartiles of the
+particle-steps/s and the ratio of the medians to the first command's. A command is one of `dem-mpi bench`, LAMMPS or LIGGGHTS:
+
+    python3 benches/compare.py 60 "dem-mpi bench --packing p.data --steps 600" "lmp=lmp -in benches/peers/in.lammps -var ..."
+    python3 benches/compare.py 60 "dem-mpi bench --packing p.data" "2*dem-mpi bench --packing p.data --threads 2"
+
+On a shared machine somebody else may run on the core's other hardware thread, which takes up to half of its speed. A loop
+of one short instruction and a jump, which then takes two cycles a turn instead of one, tells: runs count only if it was fast
+right before and right after, on each of the cores. Needs a C compiler (cc) and Linux.
 """
 import os, re, statistics, subprocess, sys, tempfile, time
 
@@ -26,46 +30,74 @@ int main(void) {
     printf("%g\n", least);
 }
 """
+ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="1")
+if os.geteuid() == 0:
+    ENVIRONMENT.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+
+
+def particle_steps_per_second(text):
+    """From dem-mpi's own line, or from the last loop of LAMMPS or LIGGGHTS."""
+    loops = re.findall(r"Loop time of (\S+) on \d+ procs for (\d+) steps with (\d+) atoms", text)
+    if loops:
+        seconds, steps, particles = map(float, loops[-1])
+        return particles * steps / seconds
+    found = re.search(r"^particle-steps/s\s+(\S+)", text, re.MULTILINE)
+    return float(found.group(1)) if found else None
+
+
+class Job:
+    def __init__(self, text):
+        name, cores, command = re.fullmatch(r"(?:([\w.:-]+)=)?(?:(\d+)\*)?(.+)", text).groups()
+        self.name, self.cores, self.command = name or text, int(cores or 1), command.split()
+        self.rates, self.tried = [], 0
+
+    def run(self, cores):
+        command = ["taskset", "-c", ",".join(map(str, cores)), *self.command]
+        done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT)
+        rate = particle_steps_per_second(done.stdout)
+        if not rate:
+            sys.exit(f"{' '.join(command)} gave no rate: {(done.stdout + done.stderr)[-500:]}")
+        return rate / 1e6
 
 
 def main():
-    if len(sys.argv) < 4:
+    if len(sys.argv) < 3:
         sys.exit(__doc__)
-    end, arguments, programs = time.time() + float(sys.argv[1]), sys.argv[2].split(), sys.argv[3:]
+    end, jobs = time.time() + float(sys.argv[1]), [Job(text) for text in sys.argv[2:]]
     with tempfile.TemporaryDirectory() as folder:
         source, spin = os.path.join(folder, "spin.c"), os.path.join(folder, "spin")
         with open(source, "w") as file:
             file.write(SPIN)
         subprocess.run(["cc", "-O2", "-falign-loops=64", "-o", spin, source], check=True)
-        cores = sorted(os.sched_getaffinity(0))
-        rate = lambda core: float(subprocess.run(["taskset", "-c", str(core), spin], capture_output=True, text=True).stdout)
-        fastest = max(rate(core) for core in cores * 10)
-        alone = lambda core: rate(core) > 0.93 * fastest
-        rates, tried = {program: [] for program in programs}, {program: 0 for program in programs}
+        every = sorted(os.sched_getaffinity(0))
+        if max(job.cores for job in jobs) > len(every):
+            sys.exit(f"there are {len(every)} cores")
+
+        def speeds(cores):
+            at_once = [subprocess.Popen(["taskset", "-c", str(core), spin], stdout=subprocess.PIPE) for core in cores]
+            return [float(process.communicate()[0]) for process in at_once]
+
+        fastest = max(speeds([core])[0] for core in every * 10)
+        alone = lambda cores: min(speeds(cores)) > 0.93 * fastest
         while time.time() < end:
-            program = min(programs, key=lambda program: (len(rates[program]), tried[program]))
-            core = next((core for core in cores if alone(core)), None)
-            if core is None:
+            job = min(jobs, key=lambda job: (len(job.rates), job.tried))
+            groups = [every[start : start + job.cores] for start in range(len(every) - job.cores + 1)]
+            cores = next((group for group in groups if alone(group)), None)
+            if cores is None:
                 time.sleep(0.05)
                 continue
-            name, *more = program.split()
-            run = ["taskset", "-c", str(core), name, "bench", *arguments, *more]
-            done = subprocess.run(run, capture_output=True, text=True)
-            found = re.search(r"particle-steps/s\s+(\S+)", done.stdout)
-            if not found:
-                sys.exit(f"{' '.join(run)} gave no rate: {done.stderr[-500:]}")
-            tried[program] += 1
-            if alone(core):
-                rates[program].append(float(found.group(1)) / 1e6)
-    for program in programs:
-        values = sorted(rates[program])
-        if len(values) < 3 or len(rates[programs[0]]) < 3:
-            print(f"{program}: {len(values)} of {tried[program]} runs undisturbed, too few")
+            rate = job.run(cores)
+            job.tried += 1
+            if alone(cores):
+                job.rates.append(rate)
+    for job in jobs:
+        if len(job.rates) < 3 or len(jobs[0].rates) < 3:
+            print(f"{job.name}: {len(job.rates)} of {job.tried} runs undisturbed, too few")
             continue
-        low, middle, high = statistics.quantiles(values, n=4)
-        ratio = middle / statistics.median(rates[programs[0]])
-        print(f"{program}: {middle:.2f} [{low:.2f}, {high:.2f}] M particle-steps/s, {ratio:.3f}, "
-              f"{len(values)} of {tried[program]} runs undisturbed")
+        low, middle, high = statistics.quantiles(job.rates, n=4)
+        ratio = middle / statistics.median(jobs[0].rates)
+        print(f"{job.name}: {middle:.2f} [{low:.2f}, {high:.2f}] M particle-steps/s, {ratio:.3f}, "
+              f"{len(job.rates)} of {job.tried} runs undisturbed")
 
 
 main()
