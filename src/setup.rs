@@ -4,8 +4,7 @@ mod begun;
 mod overlap;
 
 use crate::config::{
-    Boundary, Config, Kinematics, Motion, PackingConfig, PairConfig, ParallelConfig, Replication, Routine,
-    TimeStepConfig,
+    Boundary, Config, Kinematics, Motion, PackingConfig, ParallelConfig, Replication, Routine, TimeStepConfig,
 };
 use crate::contact::build::BuildContext;
 use crate::error::{Error, Result};
@@ -203,7 +202,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
     };
     let passes: Vec<_> = config.pairs.iter().map(|pair| PairPass::new(pair, bodies)).collect();
     let static_passes = if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
-        let damped = config.pairs.iter().map(|pair| artificially_damped(pair, config.quasi_static.restitution));
+        let damped = config.pairs.iter().map(|pair| pair.artificially_damped(config.quasi_static.restitution));
         damped.map(|pair| PairPass::new(&pair, bodies)).collect()
     } else {
         Vec::new()
@@ -221,6 +220,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         reference_overlap: overlap,
         reference_stiffness: stiffnesses.fold(0.0, |m, k| if k > m { k } else { m }),
         damped_safety: config.damped_safety(extremes.ellipsoids),
+        quasi_static_safety: config.quasi_static_safety(extremes.ellipsoids),
     };
     let walls = config.cell.boundary.map(|boundary| match boundary {
         Boundary::Periodic => None,
@@ -254,17 +254,6 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
     };
     agree(comm, check_fit(&model, initial))?;
     Ok(model)
-}
-
-/// The pair with every dashpot that its laws have, at this restitution coefficient: the artificial damping of the
-/// quasi-static routine. Laws and memory are the same.
-fn artificially_damped(pair: &PairConfig, restitution: f64) -> PairConfig {
-    let mut pair = pair.clone();
-    pair.properties.restitution = restitution;
-    for choice in [Some(&mut pair.normal), pair.tangential.as_mut(), pair.rolling.as_mut()].into_iter().flatten() {
-        choice.damp();
-    }
-    pair
 }
 
 fn check_fit(model: &Model, initial: &Initial) -> Result<()> {

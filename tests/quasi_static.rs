@@ -174,6 +174,14 @@ fn stress_depends_neither_on_the_substeps_of_a_block_nor_on_the_pseudo_time_step
 }
 
 #[test]
+fn strong_dashpots_shorten_the_pseudo_time_step_and_do_not_keep_a_packing_in_motion() {
+    let config = root().join("configs/quasi_static.toml");
+    let extra = ["--set", "stage.0.until_strain={z=0.0005}", "--set", "load.quasi_static.restitution=0.2"];
+    let rows = rows(&config, &scratch("strong"), &[&extra[..], &["--set", "output.plots=false"]].concat());
+    assert_eq!(rows.last().unwrap().increment, 5);
+}
+
+#[test]
 fn same_bits_over_ranks_threads_skins_and_restarts() {
     let config = data("quasi_static.toml");
     let outcome = |name: &str, ranks: usize, threads: usize, extra: &[&str]| {

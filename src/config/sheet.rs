@@ -223,9 +223,14 @@ fn contact_time(config: &Config, overlap: f64) -> Option<(f64, String)> {
     (stiffest.0 > 0.0).then(|| ((mass / stiffest.0).sqrt(), stiffest.1))
 }
 
+/// Whether any particles are ellipsoids.
+fn ellipsoids(config: &Config) -> bool {
+    !config.species.iter().all(Species::is_spherical)
+}
+
 /// The automatic time step at this overlap over radius \[s\], and the pair that limits it.
 fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, String)> {
-    let safety = safety.min(config.damped_safety(!config.species.iter().all(Species::is_spherical)));
+    let safety = safety.min(config.damped_safety(ellipsoids(config)));
     contact_time(config, overlap).map(|(time, pair)| (safety * time, pair))
 }
 

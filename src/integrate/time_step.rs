@@ -19,6 +19,8 @@ pub struct TimeStepControl {
     pub reference_stiffness: f64,
     /// Largest β that the dashpots allow ([`crate::config::Config::damped_safety`]).
     pub damped_safety: f64,
+    /// β of quasi-static stages ([`crate::config::Config::quasi_static_safety`]).
+    pub quasi_static_safety: f64,
 }
 
 /// What is measured at a control step.

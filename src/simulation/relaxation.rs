@@ -15,6 +15,8 @@ use crate::state::QuasiStaticState;
 const SOFTEST: f64 = 1e-5;
 /// Substeps downhill before the mixing of FIRE shrinks, and the factor then.
 const DOWNHILL: (u64, f64) = (5, 0.99);
+/// Restitution of the artificial dashpots above which friction was seen to keep packings in motion.
+const WEAK_DASHPOTS: f64 = 0.7;
 
 /// How far from equilibrium: value and threshold of each criterion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +91,7 @@ impl Simulation {
         } else if block_ends && state.substep >= settings.substeps.saturating_mul(settings.max_blocks) {
             return Err(self.no_equilibrium(&residuals, &settings));
         }
-        self.choose_pseudo_time_step(&report, &settings)?;
+        self.choose_pseudo_time_step(&report)?;
         Ok((settled || starts).then_some(report))
     }
 
@@ -127,14 +129,27 @@ impl Simulation {
             message: format!(
                 "increment {increment} (strain [{:.6}, {:.6}, {:.6}]) has not reached equilibrium in {} blocks of {} \
                  substeps: {name} is {value:.3e}, above max_{key}_ratio = {threshold:e}; raise \
-                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment",
-                strain[0], strain[1], strain[2], settings.max_blocks, settings.substeps
+                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment{}",
+                strain[0],
+                strain[1],
+                strain[2],
+                settings.max_blocks,
+                settings.substeps,
+                if settings.restitution > WEAK_DASHPOTS {
+                    format!(
+                        "; with load.quasi_static.restitution = {} dashpots are weak and friction may keep a packing \
+                         in motion: try 0.5",
+                        settings.restitution
+                    )
+                } else {
+                    String::new()
+                }
             ),
         }
     }
 
     /// β √(m_min/K), K the largest stiffness now, or at the overlap to which the next increment may bring contacts.
-    fn choose_pseudo_time_step(&mut self, report: &Report, settings: &QuasiStaticConfig) -> Result<()> {
+    fn choose_pseudo_time_step(&mut self, report: &Report) -> Result<()> {
         let bound = self.model.time_step;
         let radius = self.model.max_radius;
         let mut overlap = report.row.max_overlap_ratio * radius;
@@ -148,7 +163,7 @@ impl Simulation {
         for other in [expected, max_stiffness] {
             stiffness = if other > stiffness { other } else { stiffness };
         }
-        self.global.time_step = settings.safety * (bound.min_mass / stiffness).sqrt();
+        self.global.time_step = bound.quasi_static_safety * (bound.min_mass / stiffness).sqrt();
         if self.global.time_step.is_finite() {
             return Ok(());
         }

@@ -37,7 +37,8 @@ pub static QUASI_STATIC: Table = Table {
             "safety",
             number(Dimension::NONE, Range::closed(0.01, 0.6)),
             Default::Number(0.3),
-            "The pseudo time step is safety · √(smallest mass / largest contact stiffness).",
+            "The pseudo time step is safety · √(smallest mass / largest contact stiffness); strong dashpots (restitution) \
+             lower the factor, as packings would vibrate otherwise.",
         ),
         threshold("max_unbalanced_ratio", 1e-3, "Mean unbalanced force over mean contact force at equilibrium."),
         threshold("max_kinetic_ratio", 1e-6, "Kinetic over elastic energy at equilibrium."),
