@@ -55,6 +55,11 @@ pub fn table(options: &ScalingOptions) -> Result<String> {
             return Err(Error::Input(format!("{name} {value}: give a number greater than 0")));
         }
     }
+    for (name, value) in [("--contact-share", contact_share), ("--solid-fraction", solid_fraction)] {
+        if value > 1.0 {
+            return Err(Error::Input(format!("{name} {value}: give a number of at most 1")));
+        }
+    }
     if !(skin >= 0.0 && skin.is_finite()) {
         return Err(Error::Input(format!("--skin {skin}: give 0 or a positive number")));
     }

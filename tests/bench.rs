@@ -54,6 +54,22 @@ fn a_packing_is_timed_on_any_ranks_and_the_last_line_is_the_loop_time() {
 }
 
 #[test]
+fn numbers_without_meaning_are_refused() {
+    for (name, value) in [("--repeats", "0"), ("--steps", "0"), ("--threads", "0")] {
+        let output = bench(1, &scratch("refused"), &[name, value]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(&format!("'{value}' for '{name}")), "{}", text(&output));
+    }
+    for (name, value) in [("--contact-share", "2"), ("--solid-fraction", "1.1"), ("--latency", "0")] {
+        let mut command = command(1);
+        command.args(["scaling", name, value]).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let output = common::wait(command.spawn().expect("the program starts"));
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(&format!("{name} {value}: give")), "{}", text(&output));
+    }
+}
+
+#[test]
 fn replicas_behave_like_the_base() {
     let folder = scratch("copies");
     packing(&folder);

@@ -37,7 +37,7 @@ pub fn run(comm: &Communicator, path: &Path, options: &BenchOptions) -> Result<(
         replicate(comm, &mut initial, copies);
     }
     let total = initial.global.particles;
-    let steps = options.steps.unwrap_or_else(|| (20_000_000 / total).clamp(20, 100_000)).max(1);
+    let steps = options.steps.unwrap_or_else(|| (20_000_000 / total).clamp(20, 100_000));
     let warm = options.warm.unwrap_or_else(|| (2_000_000 / total).clamp(10, 1000));
     let config = Arc::new(parse(vec![(Leg::AlongZ(STRAIN_RATE), warm + steps)])?);
     let threads = set_up_threads(comm, &config);

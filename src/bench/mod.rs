@@ -29,10 +29,10 @@ pub struct BenchOptions {
     #[arg(long, value_delimiter = ',')]
     layouts: Vec<Layout>,
     /// Repeats of each combination.
-    #[arg(long, default_value_t = 3)]
-    repeats: usize,
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
     /// Steps to time; by itself some seconds' worth.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
     /// Steps before the timed ones.
     #[arg(long)]
@@ -131,7 +131,7 @@ fn table(options: &BenchOptions) -> Result<()> {
         let plan = Plan::new(size, options.aspects);
         let file = base_packing(folder.path(), plan, options)?;
         let mut series = vec![Series::default(); layouts.len()];
-        for _ in 0..options.repeats.max(1) {
+        for _ in 0..options.repeats {
             for (layout, series) in layouts.iter().zip(&mut series) {
                 series.add(launch::measure(&file, plan.copies, *layout, options)?);
             }

@@ -40,16 +40,11 @@ pub fn study(options: &BenchOptions) -> Result<()> {
     let plan = Plan::new(particles, None);
     let file = base_packing(folder.path(), plan, options)?;
     let mut series = vec![Series::default(); layouts.len()];
-    for repeat in 0..options.repeats.max(1) {
+    for repeat in 0..options.repeats {
         for (layout, series) in layouts.iter().zip(&mut series) {
             let sized = if options.weak { plan.times(layout.cores()) } else { plan };
             let one = measure(&file, sized.copies, *layout, options)?;
-            eprintln!(
-                "repeat {} of {}: {layout} {:.4e} particle-steps/s",
-                repeat + 1,
-                options.repeats.max(1),
-                one.rate
-            );
+            eprintln!("repeat {} of {}: {layout} {:.4e} particle-steps/s", repeat + 1, options.repeats, one.rate);
             series.add(one);
         }
     }

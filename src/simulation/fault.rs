@@ -39,11 +39,16 @@ impl Simulation {
         let Some(index) = lost.map(|index| index as usize) else { return Ok(()) };
         self.write_post_mortem(&[index]);
         let state = self.particles.state(index);
+        let remedy = if self.particles.record[index].inverse_mass == 0.0 {
+            "its motion is prescribed: end the stage before, lower the velocity of its species or enlarge the cell"
+        } else {
+            "use a smaller time step or a slower load"
+        };
         Err(Error::Simulation {
             step: self.global.step,
             message: format!(
                 "rank {}: particle {} left the cell or is not a number: position {:?} m, velocity {:?} m/s, cell {:?} m; \
-                 use a smaller time step or a slower load (last states in post_mortem)",
+                 {remedy} (last states in post_mortem)",
                 self.comm.rank(),
                 state.id,
                 state.position,

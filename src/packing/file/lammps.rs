@@ -317,6 +317,9 @@ impl Atoms {
         let index = self.index(words.next())?;
         let [vx, vy, vz, wx, wy, wz] = numbers(&mut words, ["vx", "vy", "vz", "wx", "wy", "wz"])?;
         if let Some(row) = &mut self.rows[index] {
+            if row.velocity.is_some() {
+                return Err(format!("atom {} has its velocities twice; remove one of the lines", index + 1));
+            }
             row.velocity = Some([vx, vy, vz]);
             row.spin = Some([wx, wy, wz]);
         }

@@ -132,6 +132,7 @@ fn bad_atoms_are_refused_with_line_and_remedy() {
     let three = with("2 atom types", "3 atom types").replace("3 1 0.5 1800", "3 3 0.5 1800");
     assert_refused(&three, &["line 14", "type 3 has no species, the input has 2", "[[species]]"]);
     assert_refused(&with("1 0 0 0 0 0 0\n", "1 0 0 0\n"), &["line 21", "4 columns", "id vx vy vz"]);
+    assert_refused(&with("3 -1 0 0", "1 -1 0 0"), &["line 22", "atom 1 has its velocities twice"]);
 }
 
 #[test]
