@@ -201,12 +201,11 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
         _ => Bodies::Spheres,
     };
     let passes: Vec<_> = config.pairs.iter().map(|pair| PairPass::new(pair, bodies)).collect();
-    let static_passes = if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
-        let damped = config.pairs.iter().map(|pair| pair.artificially_damped(config.quasi_static.restitution));
-        damped.map(|pair| PairPass::new(&pair, bodies)).collect()
-    } else {
-        Vec::new()
-    };
+    let quasi_static = config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic);
+    let static_passes = [config.quasi_static.restitution, 1.0].map(|restitution| {
+        let pairs = config.pairs.iter().filter(|_| quasi_static);
+        pairs.map(|pair| PairPass::new(&pair.artificially_damped(restitution), bodies)).collect()
+    });
     let fraction = match config.time_step {
         TimeStepConfig::Automatic { reference_overlap, .. } => reference_overlap,
         TimeStepConfig::Fixed(_) => 1e-3,

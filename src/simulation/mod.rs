@@ -46,8 +46,8 @@ pub struct Model {
     pub species: Vec<SpeciesConstants>,
     /// One contact pass per pair of materials.
     pub passes: Vec<PairPass>,
-    /// The same with the artificial damping of quasi-static stages; empty without such stages.
-    pub static_passes: Vec<PairPass>,
+    /// The same with the artificial damping of quasi-static stages, and without any; empty without such stages.
+    pub static_passes: [Vec<PairPass>; 2],
     /// Stages and kinematics.
     pub programme: LoadProgramme,
     /// Bounds of the time step.
@@ -364,7 +364,7 @@ impl Simulation {
     fn observe_contacts(&mut self, wanted: Wanted) -> Observation {
         self.timers.start(Stage::Observe);
         let motion = self.cell_motion();
-        let passes = self.model.passes_in_force(self.is_quasi_static());
+        let passes = self.model.passes_with(self.dashpots());
         let phase = Phase { passes, input: self.pass_input(&motion, 0.0) };
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
@@ -379,12 +379,12 @@ impl Simulation {
     fn move_on(&mut self, plan: &StepPlan, motion: &StepMotion, fresh: bool) -> (StepResult, Option<PassFault>) {
         let cell = self.cell_motion();
         let input = self.pass_input(&cell, plan.time_step);
-        let relaxed = self.is_quasi_static();
+        let dashpots = self.dashpots();
         if self.contacts.strips.len() > 1 {
             workers::keep_awake();
         }
         let Self { comm, model, halo, particles, contacts, lines, reference, ghost_wraps, timers, .. } = self;
-        let phase = Phase { passes: model.passes_in_force(relaxed), input };
+        let phase = Phase { passes: model.passes_with(dashpots), input };
         let (inner, strips) = (contacts.inner, contacts.strips.len());
         let moving = if inner == strips { particles.owned } else { contacts.strips[inner].particles.start };
         let inner_part = |particles: &mut Particles,

@@ -35,11 +35,27 @@ impl Residuals {
     }
 }
 
+/// The dashpots of an evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dashpots {
+    /// Dynamic stages.
+    OfMaterials,
+    /// Substeps of the quasi-static routine.
+    Artificial,
+    /// The evaluation that sees the jump of an increment: it is no motion in time, and dashpots would oppose it, or pull, with
+    /// forces that grow with the inverse of the pseudo time step; where they pull, springs would slide without limit.
+    Off,
+}
+
 impl Model {
-    /// The contact passes of the routine that runs.
+    /// The contact passes with this damping.
     #[must_use]
-    pub fn passes_in_force(&self, quasi_static: bool) -> &[PairPass] {
-        if quasi_static { &self.static_passes } else { &self.passes }
+    pub fn passes_with(&self, damping: Dashpots) -> &[PairPass] {
+        match damping {
+            Dashpots::OfMaterials => &self.passes,
+            Dashpots::Artificial => &self.static_passes[0],
+            Dashpots::Off => &self.static_passes[1],
+        }
     }
 }
 
@@ -49,10 +65,19 @@ impl Simulation {
         let (elapsed, relaxed) = (self.global.previous_time_step, self.is_quasi_static());
         if self.prepared_for != Some((elapsed.to_bits(), relaxed)) {
             self.prepared_for = Some((elapsed.to_bits(), relaxed));
-            let Model { passes, static_passes, .. } = &mut self.model;
-            for pass in if relaxed { static_passes } else { passes } {
+            let Model { passes, static_passes: [damped, undamped], .. } = &mut self.model;
+            for pass in if relaxed { damped.iter_mut().chain(undamped) } else { passes.iter_mut().chain(&mut []) } {
                 pass.prepare(elapsed, relaxed);
             }
+        }
+    }
+
+    /// The dashpots of the next evaluation.
+    pub(super) fn dashpots(&self) -> Dashpots {
+        match self.global.quasi_static {
+            _ if !self.is_quasi_static() => Dashpots::OfMaterials,
+            Some(QuasiStaticState { substep: 1, .. }) => Dashpots::Off,
+            _ => Dashpots::Artificial,
         }
     }
 
