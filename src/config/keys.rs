@@ -408,7 +408,7 @@ static AUTOMATIC: Table = Table {
     keys: &[
         key(
             "safety",
-            number(Dimension::NONE, Range::FRACTION),
+            number(Dimension::NONE, Range::closed(0.001, 0.5)),
             Default::Number(0.17),
             "Factor β; dashpots of low restitution lower it, as packings would vibrate otherwise.",
         ),

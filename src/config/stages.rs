@@ -41,7 +41,7 @@ pub(super) fn read(root: &Section, cell: Option<&CellConfig>, routine: Routine) 
             })
             .collect();
         let cycles = cycles.unwrap_or(1);
-        if cycles.saturating_mul(parts.len() as u64) > MAX_STAGES {
+        if cycles.saturating_mul(parts.len().max(1) as u64) > MAX_STAGES {
             section.problem(
                 "cycles",
                 format!("{cycles} cycles of {} parts", parts.len()),

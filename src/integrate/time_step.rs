@@ -71,9 +71,20 @@ impl TimeStepControl {
     /// The step to use until the next control step \[s\], and a warning about a large fixed one.
     ///
     /// # Errors
-    /// A fixed step beyond the stability limit `2 √(m_min/K_max)` of one contact, W (2.7).
+    /// A fixed step beyond the stability limit `2 √(m_min/K_max)` of one contact, W (2.7); speeds or stiffnesses so large
+    /// that no time step is left, or not numbers.
     pub fn choose(&self, measured: Measured, step: u64) -> Result<(f64, Option<String>)> {
         let automatic = self.automatic(measured);
+        if automatic.is_nan() || automatic <= 0.0 {
+            let Measured { max_stiffness, max_speed } = measured;
+            return Err(Error::Simulation {
+                step,
+                message: format!(
+                    "no time step is small enough for the largest speed, {max_speed:e} m/s, and contact stiffness, \
+                     {max_stiffness:e} N/m; look at the units of radii, densities, velocities and moduli"
+                ),
+            });
+        }
         let TimeStepConfig::Fixed(fixed) = self.config else { return Ok((automatic, None)) };
         let limit = 2.0 * self.of_stiffness(measured);
         if fixed > limit {
