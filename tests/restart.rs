@@ -105,6 +105,24 @@ fn dents_and_necks_survive_a_restart_on_any_rank_count() {
 }
 
 #[test]
+fn memory_of_a_contact_that_has_just_parted_depends_neither_on_a_restart_nor_on_the_skin() {
+    let config = data("parting_from_walls.toml");
+    let digest = |name: &str, extra: &[&str]| {
+        let folder = scratch(name);
+        let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &folder, extra);
+        assert!(output.status.success(), "{}", text(&output));
+        (digest_of(&output), folder)
+    };
+    let (whole, folder) = digest("parting", &[]);
+    for skin in ["0.3", "0.005"] {
+        assert_eq!(digest("other_skin", &["--set", &format!("parallel.skin={skin}")]).0, whole, "skin {skin}");
+    }
+    let checkpoint = folder.join(format!("checkpoint-{:012}.h5", 200));
+    let restarted = digest("parting_restarted", &["--restart", checkpoint.to_str().expect("a path")]);
+    assert_eq!(restarted.0, whole);
+}
+
+#[test]
 fn a_stage_added_to_a_complete_run_is_run_as_if_it_had_been_there() {
     let config = data("mixed_flow.toml");
     let whole = std::fs::read_to_string(&config).expect("the input is text");

@@ -173,18 +173,19 @@ impl BuildContext {
         }
     }
 
-    /// All non-zero memory of the list. `only_owned_low`: leave out contacts whose lower id is a ghost,
-    /// so that over all ranks each contact comes once.
+    /// All non-zero memory of those contacts of the list that `wanted` holds for, called with section and place.
     #[must_use]
-    pub fn collect_memory(&self, list: &ContactList, particles: &Particles, only_owned_low: bool) -> ContactMemory {
+    pub fn collect_memory(
+        &self,
+        list: &ContactList,
+        particles: &Particles,
+        wanted: impl Fn(&Section, usize) -> bool,
+    ) -> ContactMemory {
         let width = self.memory_width();
         let mut memory = ContactMemory::new(width);
         let mut row = vec![0.0; width];
         for (number, section) in list.sections.iter().enumerate().filter(|(_, section)| section.columns > 0) {
-            for place in 0..section.count {
-                if only_owned_low && section.first_of(place) >= particles.owned {
-                    continue;
-                }
+            for place in (0..section.count).filter(|&place| wanted(section, place)) {
                 row.fill(0.0);
                 section.read_memory(place, &mut row);
                 if row.iter().any(|value| *value != 0.0) {
@@ -194,6 +195,21 @@ impl BuildContext {
         }
         memory
     }
+}
+
+/// Whether the gap of a contact, between the spheres around ellipsoids, is less than `reach`.
+#[must_use]
+pub fn is_within(section: &Section, place: usize, particles: &Particles, sides: [f64; 3], reach: f64) -> bool {
+    let first = &particles.record[section.first_of(place)];
+    if section.partners == Partners::Wall {
+        let (axis, high) = (section.wall_of(place) as usize / 2, section.wall_of(place) % 2 == 1);
+        let distance = if high { sides[axis] - first.position[axis] } else { first.position[axis] };
+        return distance < first.radius + reach;
+    }
+    let (second, shift) = (&particles.record[section.second_of(place)], shift::decode(section.shift[place]));
+    let d = [0, 1, 2].map(|k| second.position[k] + f64::from(shift[k]) * sides[k] - first.position[k]);
+    let sum = first.radius + second.radius + reach;
+    d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < sum * sum
 }
 
 /// The candidates of one strip's particles.

@@ -2,6 +2,7 @@
 //! skin, and inside it the contact list with a thin one.
 
 use super::{Model, Simulation, Stage};
+use crate::contact::build::is_within;
 use crate::contact::ends::End;
 use crate::contact::list::ContactList;
 use crate::error::{Error, Result};
@@ -15,6 +16,9 @@ use crate::state::ContactMemory;
 
 /// Skin of the contact list as a fraction of the largest diameter.
 const INNER_SKIN: f64 = 0.005;
+
+/// Gap over radius within which rounding may decide whether spheres touch.
+const ROUNDING: f64 = 1e-9;
 
 /// With fewer particles per thread threads cost more than they give.
 const MIN_PARTICLES_PER_STRIP: usize = 1000;
@@ -55,7 +59,7 @@ impl Model {
 
     /// Largest gap over which a contact may keep its memory, with room for rounding \[m\]. No effective radius
     /// is above the largest radius.
-    fn memory_reach(&self) -> f64 {
+    pub(super) fn memory_reach(&self) -> f64 {
         let range = self.passes.iter().map(PairPass::range).fold(0.0, |m, r| if r > m { r } else { m });
         1.01 * range * self.max_radius
     }
@@ -89,7 +93,7 @@ impl Simulation {
             Stale::VerletList => {
                 self.timers.start(Stage::Neighbours);
                 self.update_ghosts();
-                let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, false);
+                let memory = self.model.lists.collect_memory(&self.contacts, &self.particles, |_, _| true);
                 self.rebuild_all(memory)?;
                 self.timers.verlet_rebuilds += 1;
                 self.timers.stop();
@@ -100,6 +104,17 @@ impl Simulation {
         let near = !matches!(self.stale(bound + 2.0 * step), Stale::Nothing);
         self.budget.displacement.watch = if near { Watch::Displacements } else { Watch::Speeds };
         Ok(())
+    }
+
+    /// The memory of contacts whose lower id is owned. What has parted in the last step keeps its memory until the laws are
+    /// asked again, if it is still listed; it is left out, as the state must not depend on when lists were made.
+    pub(super) fn memory_of_state(&self) -> ContactMemory {
+        let (particles, sides) = (&self.particles, self.global.sides);
+        let (lasting, touching) = (self.model.memory_reach(), ROUNDING * self.model.max_radius);
+        let reach = if lasting > touching { lasting } else { touching };
+        self.model.lists.collect_memory(&self.contacts, particles, |section, place| {
+            section.first_of(place) < particles.owned && is_within(section, place, particles, sides, reach)
+        })
     }
 
     /// Send and receive ghosts, and adjust the contacts of ghosts that wrapped.

@@ -242,7 +242,7 @@ impl Simulation {
     /// The halo exchange failed on some rank.
     pub fn export(&mut self) -> Result<(Vec<ParticleState>, ContactMemory)> {
         self.update_ghosts();
-        Ok((self.particles.states(), self.model.lists.collect_memory(&self.contacts, &self.particles, true)))
+        Ok((self.particles.states(), self.memory_of_state()))
     }
 
     /// Enter the stage that is due; true when the run is over.
