@@ -51,7 +51,7 @@ fn a_fault_on_the_command_line_is_shown_as_one() {
         ("parallel.threads=100000", "parallel.threads: 100000 threads per rank"),
         ("stage=[]", "error: stage: is an empty list"),
         ("stage.0.cycles=9223372036854775807", "at most 100000 stages in all"),
-        ("time_step.automatic.safety=0.6", "found the number 0.6"),
+        ("time_step.automatic.safety=0.6", "the number 0.6 is out of range"),
         ("title=[]", "error: title: found a list of 0"),
     ];
     for (argument, fragment) in cases {
