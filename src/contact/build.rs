@@ -5,7 +5,7 @@ use super::list::ContactList;
 use super::section::{PARTNERS, Partners, Section};
 use super::shift;
 use crate::neighbour::verlet::Candidates;
-use crate::state::particles::Particles;
+use crate::state::particles::{Particles, Record};
 use crate::state::{ContactKey, ContactMemory};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -130,12 +130,10 @@ impl BuildContext {
         for index in owners.clone() {
             let record = &particles.record[index];
             for (axis, material) in self.walls.iter().enumerate().filter_map(|(axis, wall)| Some((axis, (*wall)?))) {
-                for high in [false, true] {
-                    let distance = if high { sides[axis] - record.position[axis] } else { record.position[axis] };
-                    if distance >= record.radius + self.skin || record.inverse_mass == 0.0 {
+                for wall in [2 * axis as u32, 2 * axis as u32 + 1] {
+                    if !reaches_wall(record, wall, sides, self.skin) || record.inverse_mass == 0.0 {
                         continue;
                     }
-                    let wall = 2 * axis as u32 + u32::from(high);
                     let pair = self.pair_index(self.material[particles.species[index] as usize], material);
                     let section = &mut sections[self.section_of(Partners::Wall, pair)];
                     let place = section.count;
@@ -202,13 +200,23 @@ impl BuildContext {
 pub fn is_within(section: &Section, place: usize, particles: &Particles, sides: [f64; 3], reach: f64) -> bool {
     let first = &particles.record[section.first_of(place)];
     if section.partners == Partners::Wall {
-        let (axis, high) = (section.wall_of(place) as usize / 2, section.wall_of(place) % 2 == 1);
-        let distance = if high { sides[axis] - first.position[axis] } else { first.position[axis] };
-        return distance < first.radius + reach;
+        return reaches_wall(first, section.wall_of(place), sides, reach);
     }
-    let (second, shift) = (&particles.record[section.second_of(place)], shift::decode(section.shift[place]));
-    let d = [0, 1, 2].map(|k| second.position[k] + f64::from(shift[k]) * sides[k] - first.position[k]);
-    let sum = first.radius + second.radius + reach;
+    let second = &particles.record[section.second_of(place)];
+    are_near(first, second, shift::decode(section.shift[place]), sides, reach)
+}
+
+/// Whether the gap to a wall (2·axis + side) is less than `reach`.
+fn reaches_wall(record: &Record, wall: u32, sides: [f64; 3], reach: f64) -> bool {
+    let (axis, high) = (wall as usize / 2, wall % 2 == 1);
+    let distance = if high { sides[axis] - record.position[axis] } else { record.position[axis] };
+    distance < record.radius + reach
+}
+
+/// Whether the gap between two spheres, the second in its image, is less than `reach`.
+fn are_near(a: &Record, b: &Record, shift: [i32; 3], sides: [f64; 3], reach: f64) -> bool {
+    let d = [0, 1, 2].map(|k| b.position[k] + f64::from(shift[k]) * sides[k] - a.position[k]);
+    let sum = a.radius + b.radius + reach;
     d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < sum * sum
 }
 
@@ -240,9 +248,7 @@ impl StripView<'_> {
 
     fn is_near(&self, pair: &Pair) -> bool {
         let (a, b) = (&self.particles.record[pair.first], &self.particles.record[pair.second]);
-        let d = [0, 1, 2].map(|k| b.position[k] + f64::from(pair.shift[k]) * self.sides[k] - a.position[k]);
-        let sum = a.radius + b.radius + self.context.skin;
-        d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < sum * sum
+        are_near(a, b, pair.shift, self.sides, self.context.skin)
     }
 
     /// Two sweeps over the candidates, in whose order the contacts of each section lie: forward to close the
