@@ -149,26 +149,21 @@ impl Simulation {
         let (name, value, threshold, key) = residuals.worst();
         let increment = self.relaxation().increments + 1;
         let strain = self.global.strain;
+        let weak = if settings.restitution > WEAK_DASHPOTS {
+            format!(
+                "; with load.quasi_static.restitution = {} dashpots are weak and friction may keep a packing in motion: try 0.5",
+                settings.restitution
+            )
+        } else {
+            String::new()
+        };
         Error::Simulation {
             step: self.global.step,
             message: format!(
                 "increment {increment} (strain [{:.6}, {:.6}, {:.6}]) has not reached equilibrium in {} blocks of {} \
                  substeps: {name} is {value:.3e}, above max_{key}_ratio = {threshold:e}; raise \
-                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment{}",
-                strain[0],
-                strain[1],
-                strain[2],
-                settings.max_blocks,
-                settings.substeps,
-                if settings.restitution > WEAK_DASHPOTS {
-                    format!(
-                        "; with load.quasi_static.restitution = {} dashpots are weak and friction may keep a packing \
-                         in motion: try 0.5",
-                        settings.restitution
-                    )
-                } else {
-                    String::new()
-                }
+                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment{weak}",
+                strain[0], strain[1], strain[2], settings.max_blocks, settings.substeps
             ),
         }
     }
