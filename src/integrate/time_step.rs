@@ -71,11 +71,11 @@ impl TimeStepControl {
     /// The step to use until the next control step \[s\], and a warning about a large fixed one.
     ///
     /// # Errors
-    /// A fixed step beyond the stability limit `2 √(m_min/K_max)` of one contact, W (2.7); speeds or stiffnesses so large
-    /// that no time step is left, or not numbers.
+    /// A fixed step beyond the stability limit `2 √(m_min/K_max)` of one contact, W (2.7); a speed or stiffness so large
+    /// that no time step is left.
     pub fn choose(&self, measured: Measured, step: u64) -> Result<(f64, Option<String>)> {
         let automatic = self.automatic(measured);
-        if automatic.is_nan() || automatic <= 0.0 {
+        if automatic == 0.0 {
             let Measured { max_stiffness, max_speed } = measured;
             return Err(Error::Simulation {
                 step,
@@ -102,5 +102,27 @@ impl TimeStepControl {
             )
         });
         Ok((fixed, warning))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_that_leaves_no_time_step_is_an_error() {
+        let config = TimeStepConfig::Automatic { safety: 0.17, reference_overlap: 1e-3 };
+        let control = TimeStepControl {
+            config,
+            min_mass: 1e-9,
+            max_mass: 1e-9,
+            reference_overlap: 1e-8,
+            reference_stiffness: 1e4,
+            damped_safety: f64::INFINITY,
+            quasi_static_safety: 0.3,
+        };
+        let at = |max_speed| control.choose(Measured { max_stiffness: 0.0, max_speed }, 0);
+        assert!(at(1.0).is_ok_and(|(step, _)| step > 0.0));
+        assert!(at(f64::INFINITY).unwrap_err().to_string().contains("no time step is small enough"));
     }
 }
