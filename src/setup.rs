@@ -20,7 +20,7 @@ use crate::load::LoadProgramme;
 use crate::output::checkpoint::{self, Checkpoint};
 use crate::packing::{self, Packing, Worst};
 use crate::simulation::affine::affine_energy;
-use crate::simulation::{Model, Simulation};
+use crate::simulation::{FreeParticles, LeastScale, Model, Simulation};
 use crate::state::particles::SpeciesConstants;
 use crate::state::shape::{ellipsoid_mass, is_sphere, smallest_semi_axis};
 use crate::state::{ContactMemory, GlobalState, ParticleState};
@@ -41,7 +41,7 @@ pub struct Initial {
 }
 
 /// What all ranks must know of all particles.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Extremes {
     max_radius: f64,
     min_mass: f64,
@@ -50,6 +50,8 @@ struct Extremes {
     ellipsoids: bool,
     solid_volume: f64,
     sizes: Sizes,
+    /// By species.
+    free: Vec<FreeParticles>,
 }
 
 /// The packing as initial state. A packing that is neither replicated nor perturbed lies on rank 0, the
@@ -239,6 +241,7 @@ pub fn model(comm: &Communicator, config: &Arc<Config>, initial: &Initial) -> Re
     let model = Model {
         config: Arc::clone(config),
         species,
+        least_scale: LeastScale::new(config, &passes, &extremes.free),
         passes,
         static_passes,
         programme: programme(config),
@@ -306,7 +309,8 @@ fn difference(found: &[[String; 2]], needed: &[[String; 2]]) -> String {
 fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[ParticleState]) -> Extremes {
     let mut low = [f64::INFINITY; 2];
     let mut high = [0.0_f64; 5];
-    let mut volume = [ExactSum::new()];
+    // Number, radii and mass of the free particles of each species; at the end the volume of all.
+    let mut sums = vec![ExactSum::new(); 3 * species.len() + 1];
     let raise = |place: &mut f64, value: f64| {
         if value > *place {
             *place = value;
@@ -315,7 +319,7 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
     for particle in particles {
         let constants = species[particle.species as usize];
         let mass = ellipsoid_mass(particle.semi_axes, constants.density);
-        volume[0].add(ellipsoid_mass(particle.semi_axes, 1.0));
+        sums[3 * species.len()].add(ellipsoid_mass(particle.semi_axes, 1.0));
         raise(&mut high[0], particle.radius);
         for spin in particle.spin {
             raise(&mut high[2], spin.abs());
@@ -329,6 +333,9 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
             high[3] = 1.0;
         }
         if !constants.driven {
+            for (sum, term) in sums[3 * particle.species as usize..].iter_mut().zip([1.0, particle.radius, mass]) {
+                sum.add(term);
+            }
             raise(&mut high[1], mass);
             if mass < low[0] {
                 low[0] = mass;
@@ -337,14 +344,19 @@ fn extremes(comm: &Communicator, species: &[SpeciesConstants], particles: &[Part
     }
     comm.min_f64(&mut low);
     comm.max_f64(&mut high);
-    exact_sum::reduce(comm, &mut volume);
+    exact_sum::reduce(comm, &mut sums);
+    let sums: Vec<f64> = sums.iter().map(ExactSum::value).collect();
+    let (of_species, volume) = sums.as_chunks();
+    let free =
+        of_species.iter().map(|[number, radii, mass]| FreeParticles { number: *number, radii: *radii, mass: *mass });
     Extremes {
         max_radius: high[0],
         min_mass: low[0],
         max_mass: high[1],
         max_spin: high[2],
         ellipsoids: high[3] > 0.0,
-        solid_volume: volume[0].value(),
+        solid_volume: volume[0],
+        free: free.collect(),
         sizes: Sizes { smallest: low[1], aspect_ratio: high[4] },
     }
 }

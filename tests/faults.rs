@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, data, launch, scratch, text};
+use common::{Run, data, launch, root, scratch, text};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -169,4 +169,14 @@ fn an_unstable_time_step_is_an_error_that_names_both_numbers() {
     let extra = ["--set", "time_step.fixed=1 ms"];
     let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &scratch("unstable"), &extra);
     expect_failure(&output, 1, &["unstable", "1.000e-3"]);
+}
+
+#[test]
+fn energies_that_are_no_numbers_are_an_error() {
+    let config = root().join("configs/quickstart.toml");
+    for ranks in [1, 2] {
+        let extra = ["--set", "species.0.radius=1e60", "--set", "parallel.min_particles_per_rank=1"];
+        let output = launch(&Run { config: &config, ranks, threads: 1 }, &scratch("huge"), &extra);
+        expect_failure(&output, 1, &["kinetic energy is NaN", "units of radii"]);
+    }
 }

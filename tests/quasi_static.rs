@@ -197,6 +197,32 @@ fn strong_dashpots_shorten_the_pseudo_time_step_and_do_not_keep_a_packing_in_mot
 }
 
 #[test]
+fn a_few_stiff_particles_do_not_let_a_soft_packing_pass_for_settled() {
+    // Measured against touching contacts of the stiff ones, its forces would seem to balance: +47 % of stress.
+    let rows = rows(&data("quasi_static_soft.toml"), &scratch("soft"), &[]);
+    let last = rows.last().unwrap();
+    assert!(last.coordination > 4.5 && last.unbalanced_ratio < 1e-3, "{last:?}");
+}
+
+#[test]
+fn a_sphere_that_falls_is_not_in_equilibrium_until_the_floor_carries_its_weight() {
+    let folder = scratch("falling");
+    let centre = 1.001 * RADIUS;
+    let table = format!("species,x_m,y_m,z_m,radius_m\nhard,{RADIUS:e},{RADIUS:e},{centre:e},{RADIUS:e}\n");
+    let config = column(&folder, &["hard"], "[[stage]]\nrelax = true");
+    std::fs::write(folder.join("column.csv"), table).unwrap();
+    let fall = ["--set", "gravity=[0, 0, -9.81]", "--set", "cell={sides=[3e-3, 3e-3, 4e-3], boundary={z=\"walls\"}}"];
+    let floor = ["--set", "cell.wall_material=hard"];
+    let settled = rows(&config, &folder, &[&fall[..], &floor].concat());
+    let weight = 2500.0 * 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3) * 9.81;
+    let carried = settled.last().unwrap().stress[2] * 3.0 * 3.0 * 4.0 * RADIUS * RADIUS;
+    assert!((carried / weight - 1.0).abs() < 2e-3, "{carried:e} instead of {weight:e} N");
+    let few = ["--set", "load.quasi_static.max_blocks=2"];
+    let output = go(&config, &folder, &[&fall[..], &floor, &few].concat());
+    assert!(!output.status.success() && text(&output).contains("settle in a dynamic stage"), "{}", text(&output));
+}
+
+#[test]
 fn same_bits_over_ranks_threads_skins_and_restarts() {
     let config = data("quasi_static.toml");
     let outcome = |name: &str, ranks: usize, threads: usize, extra: &[&str]| {

@@ -53,3 +53,19 @@ fn a_packing_with_friction_and_low_restitution_comes_to_rest() {
     let rest = rows[rows.len() - 2];
     assert!(rest.mean_stress() > 0.0 && rest.unbalanced_ratio < 1e-6, "{}", rest.unbalanced_ratio);
 }
+
+#[test]
+fn a_fixed_time_step_that_strains_the_cell_too_far_is_shortened_and_said_so() {
+    let config = root().join("configs/quickstart.toml");
+    let extra = ["--set", "time_step=1e-6", "--set", "output.plots=false", "--set"];
+    for (rate, expected) in [("100", 1e-7), ("1", 1e-6)] {
+        let stage = format!("stage=[{{strain_rate={{z={rate}}}, steps=5}}]");
+        let folder = scratch("shortened");
+        let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &folder, &[&extra[..], &[&stage]].concat());
+        assert!(output.status.success(), "{}", text(&output));
+        let said = text(&output).contains("1.000e-7 s instead of the fixed 1.000e-6 s");
+        assert_eq!(said, expected < 1e-6, "{}", text(&output));
+        let row = history::read(&folder).unwrap()[0];
+        assert!((row.time_step / expected - 1.0).abs() < 1e-12, "{:e}", row.time_step);
+    }
+}

@@ -396,7 +396,7 @@ static UNTIL_STRESS: Table = Table {
 
 /// `[time_step]`.
 pub static TIME_STEP: Table = Table {
-    meaning: "The time step; a plain value is the fixed one.",
+    meaning: "The time step; a plain value is the fixed one. No step strains the cell by more than 1e-5.",
     keys: &[
         key("automatic", Kind::Table(&AUTOMATIC), Absent, "From the stiffest contact, re-evaluated."),
         key("fixed", number(Dimension::TIME, Range::POSITIVE), Absent, "Set by hand."),

@@ -82,6 +82,19 @@ impl Config {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
         low * self.materials.len() - low * (low + 1) / 2 + high
     }
+
+    /// A warning of density scaling under gravity.
+    #[must_use]
+    pub fn scaled_weights(&self) -> Option<String> {
+        let scaled = self.materials.iter().find(|material| material.density_scaling != 1.0);
+        scaled.filter(|_| self.gravity != [0.0; 3]).map(|material| {
+            format!(
+                "density_scaling multiplies weights too: \"{}\" presses {:e} times as hard on what is below; for its true \
+                 weight divide gravity by that number",
+                material.name, material.density_scaling
+            )
+        })
+    }
 }
 
 /// One axis of the cell.

@@ -419,6 +419,7 @@ fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
             if step > limit { "; it is unstable, and the run will refuse it" } else { "" }
         ));
     }
+    warnings.extend(config.scaled_weights());
     let held = config.species.iter().any(|s| matches!(s.motion, super::Motion::Driven { .. }));
     for axis in (0..3).filter(|axis| config.gravity[*axis] != 0.0) {
         if config.cell.boundary[axis] == super::Boundary::Periodic && !held {

@@ -18,7 +18,7 @@ pub struct Sizes {
 #[must_use]
 pub fn of_run(config: &Config, sizes: Sizes) -> Vec<String> {
     let own = config.pairs.iter().flat_map(|pair| of_pair(pair, sizes));
-    let mut cautions: Vec<String> = own.chain(of_dashpots(config)).collect();
+    let mut cautions: Vec<String> = own.chain(of_dashpots(config)).chain(config.scaled_weights()).collect();
     cautions.dedup();
     cautions
 }

@@ -3,6 +3,7 @@
 
 pub mod affine;
 mod fault;
+mod least_scale;
 mod lists;
 mod relaxation;
 mod report;
@@ -12,6 +13,7 @@ mod timers;
 mod traffic;
 mod workers;
 
+pub use least_scale::{FreeParticles, LeastScale};
 pub use report::Report;
 pub use timers::{STAGES, Stage, Timers};
 
@@ -52,6 +54,8 @@ pub struct Model {
     pub programme: LoadProgramme,
     /// Bounds of the time step.
     pub time_step: TimeStepControl,
+    /// Least force and energy for tests of equilibrium.
+    pub least_scale: LeastScale,
     /// What the list builder must know.
     pub lists: BuildContext,
     /// Largest radius of all particles \[m\].
@@ -290,7 +294,7 @@ impl Simulation {
         self.prepare();
         self.update_ghosts();
         let observation = self.observe_contacts(wanted);
-        Ok(self.reduce(observation, wanted))
+        self.reduce(observation, wanted)
     }
 
     /// What is due at the present positions: control of time step and load, reports.
@@ -304,7 +308,7 @@ impl Simulation {
         self.update_ghosts();
         let observe = Wanted { sums: wanted.sums || control && self.model.needs_stress(), ..wanted };
         let observation = self.observe_contacts(observe);
-        let mut report = self.reduce(observation, observe);
+        let mut report = self.reduce(observation, observe)?;
         if control {
             self.control(&report)?;
             report.row.time_step = self.global.time_step;

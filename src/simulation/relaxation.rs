@@ -123,15 +123,11 @@ impl Simulation {
     /// # Source
     /// W Sec. 2.3: kinetic energy, contact forces, displacements.
     fn residuals(&self, report: &Report, settings: &QuasiStaticConfig) -> Residuals {
-        let bound = self.model.time_step;
-        // With weaker contacts a packing just touches, and ratios to its forces mean nothing.
-        let overlap = settings.touching_overlap * self.model.max_radius;
-        let least_force = 2.0 / 3.0 * bound.reference_stiffness * (overlap / bound.reference_overlap).sqrt() * overlap;
-        let least_energy = 0.4 * least_force * overlap * self.global.particles as f64;
+        let least = self.model.least_scale;
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let row = &report.row;
-        let unbalanced = report.mean_net_force / larger(report.mean_contact_force, least_force);
-        let kinetic = row.kinetic / larger(row.elastic, least_energy);
+        let unbalanced = report.mean_net_force / larger(report.mean_contact_force, least.force);
+        let kinetic = row.kinetic / larger(row.elastic, least.energy * self.global.particles as f64);
         let way = report.measured.max_speed * self.global.previous_time_step * settings.substeps as f64;
         Residuals([
             ("mean unbalanced force over mean contact force", unbalanced, settings.max_unbalanced_ratio, "unbalanced"),
@@ -149,20 +145,23 @@ impl Simulation {
         let (name, value, threshold, key) = residuals.worst();
         let increment = self.relaxation().increments + 1;
         let strain = self.global.strain;
-        let weak = if settings.restitution > WEAK_DASHPOTS {
-            format!(
-                "; with load.quasi_static.restitution = {} dashpots are weak and friction may keep a packing in motion: try 0.5",
-                settings.restitution
-            )
-        } else {
-            String::new()
-        };
+        let mut hints = String::new();
+        if settings.restitution > WEAK_DASHPOTS {
+            let restitution = settings.restitution;
+            hints += &format!(
+                "; with load.quasi_static.restitution = {restitution} dashpots are weak and friction may keep a packing in \
+                 motion: try 0.5"
+            );
+        }
+        if self.model.config.gravity != [0.0; 3] {
+            hints += "; a bed that falls takes very many substeps: let it settle in a dynamic stage before";
+        }
         Error::Simulation {
             step: self.global.step,
             message: format!(
                 "increment {increment} (strain [{:.6}, {:.6}, {:.6}]) has not reached equilibrium in {} blocks of {} \
                  substeps: {name} is {value:.3e}, above max_{key}_ratio = {threshold:e}; raise \
-                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment{weak}",
+                 load.quasi_static.max_blocks or that threshold, or use a smaller strain_increment{hints}",
                 strain[0], strain[1], strain[2], settings.max_blocks, settings.substeps
             ),
         }

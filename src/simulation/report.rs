@@ -2,12 +2,13 @@
 
 use super::affine::affine_energy;
 use super::{Simulation, Stage};
-use crate::config::TimeStepConfig;
-use crate::error::Result;
+use crate::config::{MAX_STRAIN_PER_STEP, TimeStepConfig};
+use crate::error::{Error, Result};
 use crate::exchange::ExactSum;
 use crate::exchange::exact_sum;
 use crate::force::observe::{CONTACT_LEDGER, Observation, SUMS, Sample, Sum, Wanted};
 use crate::integrate::time_step::Measured;
+use crate::load::LoadProgramme;
 use crate::output::history::HistoryRow;
 use crate::state::LEDGER;
 use crate::state::shape::{ellipsoid_mass, rotational_energy};
@@ -49,7 +50,10 @@ pub struct Report {
 
 impl Simulation {
     /// Add the particles' part, reduce over ranks, and turn sums into stress, energies, fabric.
-    pub(super) fn reduce(&mut self, mut observation: Observation, wanted: Wanted) -> Report {
+    ///
+    /// # Errors
+    /// A stress or energy is no number; the same on every rank.
+    pub(super) fn reduce(&mut self, mut observation: Observation, wanted: Wanted) -> Result<Report> {
         self.timers.start(Stage::Reduce);
         observation.sums.resize(ALL_SUMS, ExactSum::new());
         let max_speed = self.add_particle_sums(&mut observation, wanted);
@@ -102,14 +106,27 @@ impl Simulation {
             inertial_number: self.inertial_number((stress[0] + stress[1] + stress[2]) / 3.0),
         };
         self.timers.stop();
-        Report {
+        self.check_finite(&row)?;
+        Ok(Report {
             row,
             samples: observation.samples,
             wall_force: std::array::from_fn(|k| values[Sum::WallForce as usize + k]),
             measured: Measured { max_stiffness: largest[0], max_speed: largest[2] },
             mean_net_force: mean(values[ParticleSum::NetForce as usize], free),
             mean_contact_force: mean(values[Sum::ForceMagnitude as usize], contacts + wall_contacts),
-        }
+        })
+    }
+
+    fn check_finite(&self, row: &HistoryRow) -> Result<()> {
+        let energies = [("kinetic energy", row.kinetic), ("elastic energy", row.elastic)].into_iter();
+        let mut numbers =
+            energies.chain(row.stress.iter().chain(&row.kinetic_stress).map(|stress| ("stress", *stress)));
+        numbers.find(|(_, value)| !value.is_finite()).map_or(Ok(()), |(name, value)| {
+            let step = self.global.step;
+            let message =
+                format!("the {name} is {value}; look at the units of radii, densities, velocities and moduli");
+            Err(Error::Simulation { step, message })
+        })
     }
 
     /// Sums over owned particles; returns the largest speed. Particle by particle quantities only, so
@@ -244,16 +261,24 @@ impl Simulation {
             self.model.programme.control(&mut self.global, stiffness / self.model.max_radius, interval);
         }
         let (chosen, warning) = self.model.time_step.choose(report.measured, self.global.step)?;
-        let limit = crate::load::LoadProgramme::time_step_limit(&self.global);
+        let limit = LoadProgramme::time_step_limit(&self.global);
         self.global.time_step = if chosen < limit { chosen } else { limit };
-        if let Some(text) = warning.filter(|_| !self.warned_about_time_step) {
-            self.warned_about_time_step = true;
-            self.warnings.push(text);
+        let shortened = match self.model.config.time_step {
+            TimeStepConfig::Fixed(fixed) if limit < fixed => Some(format!(
+                "the time step is {limit:.3e} s instead of the fixed {fixed:.3e} s, as a step may strain the cell by at most \
+                 {MAX_STRAIN_PER_STEP:e}"
+            )),
+            _ => None,
+        };
+        if !self.warned_about_time_step {
+            let before = self.warnings.len();
+            self.warnings.extend(warning.into_iter().chain(shortened));
+            self.warned_about_time_step = self.warnings.len() > before;
         }
         if self.global.time_step.is_finite() {
             return Ok(());
         }
-        Err(crate::error::Error::Simulation {
+        Err(Error::Simulation {
             step: self.global.step,
             message: "no particle is free to move, so no automatic time step exists; set time_step.fixed".into(),
         })

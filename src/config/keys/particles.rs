@@ -19,7 +19,7 @@ pub static MATERIAL: Table = Table {
             "density_scaling",
             number(Dimension::NONE, Range::POSITIVE),
             Default::Number(1.0),
-            "Factor on the density: larger time steps, more inertia (see the pre-run sheet).",
+            "Factor on the density, so on masses and weights: larger time steps, more inertia (see the pre-run sheet).",
         ),
         key(
             "young_modulus",

@@ -51,8 +51,8 @@ pub static QUASI_STATIC: Table = Table {
             "touching_overlap",
             number(Dimension::NONE, Range::between(0.0, 0.1)),
             Default::Number(5e-4),
-            "Overlap over radius whose force and energy are the least that ratios refer to: where all contacts are \
-             weaker, particles just touch.",
+            "Overlap over radius whose mean force and energy are the least that ratios refer to: where all contacts are \
+             weaker, particles just touch. With gravity the force is at most the mean weight.",
         ),
     ],
 };
