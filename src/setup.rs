@@ -131,17 +131,8 @@ fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
 /// A checkpoint as initial state.
 ///
 /// # Errors
-/// The checkpoint belongs to another input (number of species or contact-memory width differ), or the input changes what
-/// no longer acts.
+/// The checkpoint belongs to another input (its species differ), or the input changes what no longer acts.
 pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initial> {
-    let species = config.species.len() as u32;
-    if let Some(particle) = checkpoint.particles.iter().find(|p| p.species >= species) {
-        return Err(Error::Input(format!(
-            "the checkpoint does not fit this input: particle {} has species number {}, the input has {species} species; \
-             restart with the configuration of that run (config.resolved.toml beside the checkpoint)",
-            particle.id, particle.species
-        )));
-    }
     let Checkpoint { mut global, mut particles, memory, columns, config_resolved, .. } = checkpoint;
     let had_ledger = begun::check(&config_resolved, &config.resolved, &global)?;
     let programme = programme(config);

@@ -199,6 +199,35 @@ fn a_run_that_cannot_begin_leaves_an_earlier_one_as_it_was() {
     assert_eq!(listing(&directory), before);
 }
 
+#[test]
+fn other_species_than_those_of_the_checkpoint_are_refused() {
+    let config = data("mixed_flow.toml");
+    let folder = scratch("species");
+    let directory = folder.join("run");
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let before = listing(&directory);
+    let whole = std::fs::read_to_string(&config).expect("the input is text");
+    let starts: Vec<usize> = whole.match_indices("[[species]]").map(|(at, _)| at).collect();
+    let end = whole.find("[contact.normal").expect("then laws");
+    let (hard, soft) = (&whole[starts[0]..starts[1]], &whole[starts[1]..end]);
+    let third = "[[species]]\nname = \"third\"\nmaterial = \"hard\"\nradius = \"1 mm\"\ncount = 1\n\n";
+    for (species, named) in [
+        ([soft, hard, ""], "the species are \"soft\", \"hard\" and were \"hard\", \"soft\""),
+        ([hard, soft, third], "the species are \"hard\", \"soft\", \"third\" and were \"hard\", \"soft\""),
+        ([hard, "", ""], "the species are \"hard\" and were \"hard\", \"soft\""),
+    ] {
+        let other = folder.join("other.toml");
+        let input = [&whole[..starts[0]], &species.concat(), &whole[end..]].concat();
+        std::fs::write(&other, input).expect("the build folder can be written");
+        let restart = ["--restart", directory.to_str().expect("a UTF-8 path")];
+        let output = launch(&Run { config: &other, ranks: 2, threads: 1 }, &directory, &restart);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(named), "{named}: {}", text(&output));
+        assert_eq!(listing(&directory), before, "{named}");
+    }
+}
+
 /// Steps of the rows of a history.
 fn steps_of(directory: &Path) -> Vec<u64> {
     let history = String::from_utf8(history_of(directory)).expect("text");

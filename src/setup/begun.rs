@@ -4,9 +4,10 @@ use crate::error::{Error, Result};
 use crate::state::GlobalState;
 use toml::{Table, Value};
 
-/// Keys of a species that say how its particles begin, and the motion that driven ones have had since.
-const OF_SPECIES: [&str; 8] =
-    ["count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin", "motion"];
+/// Keys of a species that say how its particles begin, the material whose laws their contacts' memory belongs to, and the
+/// motion that driven ones have had since.
+const OF_SPECIES: [&str; 9] =
+    ["material", "count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin", "motion"];
 /// The same of the cell, and its faces.
 const OF_CELL: [&str; 4] = ["sides", "aspect", "solid_fraction", "boundary"];
 /// Keys of a stage from which its strain follows, counted from where it began.
@@ -25,7 +26,9 @@ pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<bool> {
     changes.of_keys("", &before, &now, &["seed", "packing"]);
     changes.of_tables("cell", &before, &now, &OF_CELL);
     changes.of_tables("load", &before, &now, &["kinematics"]);
-    changes.of_lists("species", &before, &now, &OF_SPECIES, usize::MAX);
+    if changes.keeps_names(&before, &now) {
+        changes.of_lists("species", &before, &now, &OF_SPECIES, usize::MAX);
+    }
     if !changes.0.is_empty() {
         return Err(changes.refused(
             "a restart takes particles and cell from the checkpoint, so that these keys would do nothing, or not what they \
@@ -76,6 +79,19 @@ impl Changes {
     fn of_tables(&mut self, name: &str, before: &Table, now: &Table, keys: &[&str]) {
         let table = |of: &Table| of.get(name).and_then(Value::as_table).cloned().unwrap_or_default();
         self.of_keys(&format!("{name}."), &table(before), &table(now), keys);
+    }
+
+    /// Which species there are, and in which order: particles know theirs by its number.
+    fn keeps_names(&mut self, before: &Table, now: &Table) -> bool {
+        let names = |of: &Table| -> Vec<String> {
+            let species = of.get("species").and_then(Value::as_array).into_iter().flatten();
+            species.map(|one| one.get("name").map_or_else(String::new, ToString::to_string)).collect()
+        };
+        let (old, new) = (names(before), names(now));
+        if old != new {
+            self.0.push(format!("the species are {} and were {}", new.join(", "), old.join(", ")));
+        }
+        old == new
     }
 
     /// Which axes of the first `count` stages a stress steers; its target and largest rate are free.

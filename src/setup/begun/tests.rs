@@ -3,7 +3,7 @@ use crate::output::digest::tests::sample;
 use crate::state::GlobalState;
 
 const INPUT: &str = "seed = 1\n[packing.random_close]\ncontraction_rate = 0.001\n[cell]\nsolid_fraction = 0.6\n\
-    [[species]]\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
+    [[species]]\nname = \"a\"\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
     [[stage]]\nstrain_rate = [0.0, 0.0, 1.0]\nduration = 1.0\n[[stage]]\nstrain_rate = [0.0, 0.0, -1.0]\nsteps = 5\n\
     [stage.stress.x]\ntarget = 5.0\nmax_rate = 1.0\n[load]\nkinematics = \"BC\"\n\
     [output]\nhistory = \"10 steps\"\n";
@@ -32,6 +32,24 @@ fn what_a_run_begins_with_cannot_change() {
         let message = refused(from, to, &state(0, 7)).unwrap();
         assert!(message.contains(named), "{message}");
     }
+}
+
+#[test]
+fn species_keep_their_names_number_and_order() {
+    let before = "[[species]]\nname = \"a\"\n[[species]]\nname = \"b\"\n";
+    for (now, named) in [
+        ("[[species]]\nname = \"b\"\n[[species]]\nname = \"a\"\n", "are \"b\", \"a\" and were \"a\", \"b\""),
+        ("[[species]]\nname = \"a\"\n[[species]]\nname = \"c\"\n", "are \"a\", \"c\" and were \"a\", \"b\""),
+        ("[[species]]\nname = \"a\"\n", "are \"a\" and were \"a\", \"b\""),
+        (&format!("{before}[[species]]\nname = \"c\"\n"), "are \"a\", \"b\", \"c\" and were \"a\", \"b\""),
+    ] {
+        let message = check(before, now, &state(0, 7)).unwrap_err().to_string();
+        assert!(message.contains(named), "{message}");
+    }
+    let [soft, hard] = ["soft", "hard"].map(|name| before.replace("name", &format!("material = \"{name}\"\nname")));
+    assert!(check(&soft, &soft, &state(0, 7)).is_ok());
+    let message = check(&soft, &hard, &state(0, 7)).unwrap_err().to_string();
+    assert!(message.contains("species.1.material is \"hard\" and was \"soft\""), "{message}");
 }
 
 #[test]
