@@ -17,7 +17,7 @@ use crate::state::GlobalState;
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
-use signals::Signals;
+pub use signals::Signals;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -40,13 +40,12 @@ pub enum Outcome {
     Stopped(i32),
 }
 
-/// Run a configuration on the ranks of `comm`; ranks that the grid has no use for stay idle.
+/// Run a configuration on the ranks of `comm`; ranks that the grid has no use for stay idle. Every rank listens to signals,
+/// idle ones too, as mpirun forwards them to all.
 ///
 /// # Errors
 /// Whatever went wrong, the same error on every rank that computes.
-pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> Result<Outcome> {
-    // First of all, and on idle ranks too: mpirun forwards signals to every rank, and an unheard one kills.
-    let signals = agree(comm, Signals::listen())?;
+pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions, signals: Signals) -> Result<Outcome> {
     let threads = set_up_threads(comm, config);
     let mut efforts = Efforts::begin();
     let started = Instant::now();

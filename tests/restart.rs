@@ -3,8 +3,13 @@
 mod common;
 
 use common::{Run, data, digest_of, history_of, launch, scratch, start, text, wait, wait_for_file};
-use std::path::Path;
-use std::process::Command;
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 
 /// Enough steps that a signal arrives in mid-run.
 const LONG: [&str; 6] =
@@ -55,6 +60,63 @@ fn rank_of(directory: &Path) -> String {
 #[test]
 fn sigusr1_checkpoints_and_asks_to_be_queued_again() {
     stop_and_restart("-USR1", false, &[75], 3);
+}
+
+/// A named pipe in which the program waits until it is opened for writing.
+fn pipe(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    let made = Command::new("mkfifo").arg(&path).status().expect("mkfifo starts");
+    assert!(made.success());
+    path
+}
+
+/// The other end of a pipe, once `child` reads it; `None` if it ends without.
+fn opened(pipe: &Path, child: &mut Child) -> Option<File> {
+    loop {
+        // Without a reader this fails at once.
+        match OpenOptions::new().write(true).custom_flags(libc::O_NONBLOCK).open(pipe) {
+            Ok(file) => return Some(file),
+            Err(_) if child.try_wait().expect("the program can be asked").is_some() => return None,
+            Err(_) => sleep(Duration::from_millis(10)),
+        }
+    }
+}
+
+#[test]
+fn sigusr1_while_the_input_is_read_or_mpi_starts_is_heard() {
+    let folder = scratch("early");
+    let program = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dem-mpi"));
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).args(["--set", "output.plots=false", "--output"]);
+        command
+    };
+    let input = std::fs::read(data("mixed_flow.toml")).expect("the input is there");
+    let (config, settings) = (pipe(&folder, "input.toml"), pipe(&folder, "mpi.conf"));
+    let reads = program().arg(folder.join("a")).arg(&config).spawn().expect("the program starts");
+    // Open MPI reads these settings when it starts; other libraries do not, and without MPI nothing does.
+    let mut starts = program();
+    starts.arg(folder.join("b")).arg(data("mixed_flow.toml")).env("OMPI_MCA_mca_base_param_files", &settings);
+    starts
+        .env("OMPI_COMM_WORLD_SIZE", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+    let starts = starts.spawn().expect("the program starts");
+    for (mut child, pipe, content) in [(reads, &config, input), (starts, &settings, Vec::new())] {
+        let Some(mut file) = opened(pipe, &mut child) else {
+            eprintln!("SKIPPED: this MPI does not read {}", pipe.display());
+            continue;
+        };
+        // Whoever else would read it finds an empty file.
+        std::fs::remove_file(pipe).expect("it is there");
+        std::fs::write(pipe, "").expect("the build folder can be written");
+        assert!(Command::new("kill").args(["-USR1", &child.id().to_string()]).status().expect("kill starts").success());
+        // Either it is dead then or it has heard.
+        sleep(Duration::from_millis(200));
+        let _ = file.write_all(&content);
+        drop(file);
+        let output = wait(child);
+        assert_eq!(output.status.code(), Some(75), "{}: {}", pipe.display(), text(&output));
+    }
 }
 
 #[test]
