@@ -1,5 +1,6 @@
 //! A run from input to final digest: outer loop over steps, what is written when, signals, restart.
 
+mod directory;
 mod efforts;
 mod inertia;
 mod output;
@@ -13,7 +14,6 @@ use crate::output::checkpoint;
 use crate::output::digest;
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
-use crate::state::GlobalState;
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
@@ -81,7 +81,7 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions, sign
     // Only now that nothing speaks against the run does it touch what lies in its directory.
     signals.heed();
     let prepared = match simulation.comm().rank() {
-        0 => prepare(config, checkpoint.as_deref(), simulation.global()),
+        0 => directory::prepare(config, checkpoint.as_deref(), simulation.global()),
         _ => Ok(()),
     };
     agree(simulation.comm(), prepared)?;
@@ -126,18 +126,6 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
         );
     }
     Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
-}
-
-fn prepare(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {
-    if let Some(file) = checkpoint {
-        output::check_directory(config, file)?;
-        output::make_directory(config)?;
-        output::take_over(config, file)?;
-        output::check_beginning(config, global)?;
-    } else {
-        output::make_directory(config)?;
-    }
-    output::clear_future(config, global)
 }
 
 /// A run in progress on one rank.

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, data, digest_of, history_of, launch, scratch, start, text, wait, wait_for_file};
+use common::{Run, data, digest_of, history_of, launch, listing, scratch, start, text, wait, wait_for_file};
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::os::unix::fs::OpenOptionsExt as _;
@@ -213,22 +213,6 @@ fn a_stage_added_to_a_complete_run_is_run_as_if_it_had_been_there() {
     .expect("the build folder can be written");
     let relaxed = launch(&Run { config: &quasi_static, ranks: 1, threads: 1 }, &run_directory, &restart);
     assert!(matches!(relaxed.status.code(), Some(0 | 1)) && !text(&relaxed).contains("panicked"), "{}", text(&relaxed));
-}
-
-/// Names and contents of what lies in a run directory, but for checkpoints, of which only the names count.
-fn listing(directory: &Path) -> Vec<(String, Vec<u8>)> {
-    let entries = std::fs::read_dir(directory).expect("the directory can be read").flatten();
-    let mut files: Vec<_> = entries
-        .filter(|entry| entry.path().is_file())
-        .map(|entry| {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let content =
-                if name.ends_with(".h5") { Vec::new() } else { std::fs::read(entry.path()).unwrap_or_default() };
-            (name, content)
-        })
-        .collect();
-    files.sort();
-    files
 }
 
 #[test]

@@ -1,0 +1,113 @@
+//! What a run finds in its directory, what it refuses, and what it leaves.
+
+mod common;
+
+use common::{Run, data, digest_of, history_of, launch, listing, scratch, text};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// Snapshots at steps 0, 300, 600, 900 and at the end.
+const SNAPSHOTS: [&str; 2] = ["--set", "output.snapshots=300 steps"];
+
+/// A complete run with checkpoints of steps 500 and 1000.
+fn complete(name: &str) -> (PathBuf, Output) {
+    let directory = scratch(name).join("run");
+    let output = run(&directory, 1, &SNAPSHOTS);
+    assert!(output.status.success(), "{}", text(&output));
+    (directory, output)
+}
+
+fn run(directory: &Path, ranks: usize, extra: &[&str]) -> Output {
+    launch(&Run { config: &data("mixed_flow.toml"), ranks, threads: 1 }, directory, extra)
+}
+
+fn restart(from: &Path, directory: &Path, ranks: usize, extra: &[&str]) -> Output {
+    run(directory, ranks, &[&["--restart", from.to_str().expect("a UTF-8 path")], extra].concat())
+}
+
+/// One error with these words, and a code that says so.
+fn assert_refused(output: &Output, words: &[&str]) {
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{}", text(output));
+    for word in words {
+        assert_eq!(text(output).matches(word).count(), 1, "{word}: {}", text(output));
+    }
+}
+
+#[test]
+fn a_refused_restart_leaves_nothing_in_a_new_directory_and_its_remedies_work() {
+    let (whole, first) = complete("whole");
+    let half = whole.join("checkpoint-000000000500.h5");
+    let folder = scratch("new");
+    let spoil = |name: &str, spoil: &dyn Fn(&Path)| {
+        let directory = folder.join(name);
+        fs::create_dir_all(directory.join("snapshots")).expect("the build folder can be written");
+        for inside in ["", "snapshots"] {
+            for entry in fs::read_dir(whole.join(inside)).expect("the run is there").flatten() {
+                if entry.path().is_file() {
+                    fs::copy(entry.path(), directory.join(inside).join(entry.file_name())).expect("a copy");
+                }
+            }
+        }
+        spoil(&directory);
+        directory
+    };
+    let cut = |directory: &Path| {
+        let table = String::from_utf8(history_of(directory)).expect("text");
+        let rows: Vec<&str> = table.split_inclusive('\n').take(15).collect();
+        fs::write(directory.join("history.csv"), rows.concat()).expect("the table can be cut");
+    };
+    let index = |directory: &Path| {
+        fs::remove_file(directory.join("snapshots/particles.vtkhdf.series")).expect("it is there");
+    };
+    let snapshot = |directory: &Path| {
+        fs::remove_file(directory.join("snapshots/particles-000003.vtkhdf")).expect("it is there");
+    };
+    let table = |directory: &Path| fs::remove_file(directory.join("history.csv")).expect("it is there");
+    let spoilt: [(&str, &dyn Fn(&Path), &str, &str); 4] = [
+        ("cut", &cut, "holds 14 rows", "an older checkpoint"),
+        ("index", &index, "lists 0 snapshots where the checkpoint has written 4", "leave out output.snapshots"),
+        ("snapshot", &snapshot, "particles-000003.vtkhdf: is missing", "an older checkpoint"),
+        ("table", &table, "history.csv: is not there", "give the checkpoint where it lies"),
+    ];
+    for (name, how, fault, remedy) in spoilt {
+        let from = spoil(name, how);
+        let (made, empty) = (folder.join("made").join("below"), folder.join("empty"));
+        fs::create_dir_all(&empty).expect("the build folder can be written");
+        for to in [&made, &empty] {
+            assert_refused(&restart(&from, to, 2, &SNAPSHOTS), &[fault, remedy]);
+        }
+        assert!(!folder.join("made").exists(), "{name}");
+        assert_eq!(fs::read_dir(&empty).expect("it stays").count(), 0, "{name}");
+        // What the message says, in the directory that was refused.
+        let (older, extra): (_, &[&str]) = match name {
+            "index" => (from.clone(), &[]),
+            "table" => (half.clone(), &SNAPSHOTS),
+            _ => (from.join("checkpoint-000000000500.h5"), &SNAPSHOTS),
+        };
+        let again = restart(&older, &made, 2, extra);
+        assert!(again.status.success(), "{name}: {}", text(&again));
+        assert_eq!(digest_of(&again), digest_of(&first), "{name}");
+        assert_eq!(history_of(&made), history_of(&whole), "{name}");
+        fs::remove_dir_all(folder.join("made")).expect("it is there");
+    }
+}
+
+#[test]
+fn a_restart_into_a_new_directory_can_be_gone_on_with_at_once() {
+    let (whole, first) = complete("whole");
+    let (half, directory) = (whole.join("checkpoint-000000000500.h5"), scratch("new").join("run"));
+    // No checkpoint of its own yet.
+    let extra = ["--set", "contact.max_overlap_fraction=0.001", "--set", "output.snapshots=300 steps"];
+    let overlap = restart(&half, &directory, 1, &extra);
+    assert_refused(&overlap, &["overlaps by"]);
+    assert!(directory.join("history.csv").exists());
+    let refused = restart(&half, &directory, 1, &SNAPSHOTS);
+    let remedy = format!("go on with that run with --restart {}", directory.display());
+    assert_refused(&refused, &["holds another run", &remedy]);
+    let again = restart(&directory, &directory, 2, &SNAPSHOTS);
+    assert!(again.status.success(), "{}", text(&again));
+    assert_eq!((digest_of(&again), history_of(&directory)), (digest_of(&first), history_of(&whole)));
+    let names = |directory: &Path| listing(directory).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    assert_eq!(names(&directory), names(&whole));
+}
