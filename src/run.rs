@@ -3,6 +3,7 @@
 mod directory;
 mod efforts;
 mod inertia;
+mod lock;
 mod output;
 mod signals;
 
@@ -81,10 +82,11 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions, sign
     // Only now that nothing speaks against the run does it touch what lies in its directory.
     signals.heed();
     let prepared = match simulation.comm().rank() {
-        0 => directory::prepare(config, checkpoint.as_deref(), simulation.global()),
-        _ => Ok(()),
+        0 => directory::prepare(config, checkpoint.as_deref(), simulation.global()).map(Some),
+        _ => Ok(None),
     };
-    agree(simulation.comm(), prepared)?;
+    // Until the last file is written.
+    let _lock = agree(simulation.comm(), prepared)?;
     Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Run, data, digest_of, history_of, launch, listing, scratch, text};
+use common::{Run, data, digest_of, history_of, launch, listing, scratch, start, text, wait, wait_for_file};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -91,6 +91,30 @@ fn a_refused_restart_leaves_nothing_in_a_new_directory_and_its_remedies_work() {
         assert_eq!(history_of(&made), history_of(&whole), "{name}");
         fs::remove_dir_all(folder.join("made")).expect("it is there");
     }
+}
+
+#[test]
+fn a_second_run_in_the_directory_of_one_that_runs_is_refused_and_a_kill_frees_it() {
+    let directory = scratch("shared").join("run");
+    let long = ["--set", "stage.1.steps=1000000", "--set", "output.checkpoint_steps=500"];
+    let mut first = start(&Run { config: &data("mixed_flow.toml"), ranks: 1, threads: 1 }, &directory, &long);
+    wait_for_file(&directory, |name| name.ends_with(".h5"));
+    for ranks in [1, 2] {
+        for again in [run(&directory, ranks, &[]), restart(&directory, &directory, ranks, &[])] {
+            assert_refused(
+                &again,
+                &["another run is writing there", &format!("process {} on", first.id()), "--output"],
+            );
+        }
+    }
+    assert!(first.try_wait().expect("it can be asked").is_none());
+    first.kill().expect("it runs");
+    wait(first);
+    let after = run(&directory, 2, &SNAPSHOTS);
+    assert!(after.status.success(), "{}", text(&after));
+    let (whole, reference) = complete("whole");
+    assert_eq!((digest_of(&after), history_of(&directory)), (digest_of(&reference), history_of(&whole)));
+    assert!(!listing(&directory).iter().any(|(name, _)| name.contains("lock")));
 }
 
 #[test]

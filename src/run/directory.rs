@@ -1,6 +1,7 @@
 //! The directory of a run before its first step: what must lie there, what goes, what comes from that of the checkpoint.
 //! Rank 0 alone. A run that is refused leaves what it found, and nothing in a directory that it made or found empty.
 
+use super::lock::{self, Lock};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::output::files::{publish, temporary_name};
@@ -12,33 +13,44 @@ use std::path::{Path, PathBuf};
 /// The folder of snapshots in a run directory.
 const SNAPSHOTS: &str = "snapshots";
 
-/// Make the run directory ready for a run from this state, which is that of the checkpoint if there is one: a restart goes on
-/// in the directory of its checkpoint, or begins one in which no run has written with the table and snapshots so far.
+/// Make the run directory ready for a run from this state, and keep other runs out of it while the lock lives. With a
+/// checkpoint, the state is that of it: a restart goes on in the directory of its checkpoint, or begins one in which no run has
+/// written, with the table and snapshots so far.
 ///
 /// # Errors
-/// The directory cannot be made or written, or holds another run; table or snapshots do not reach to the checkpoint.
-pub fn prepare(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {
+/// The directory cannot be made or written, another run is writing there, or it holds one; table or snapshots do not reach to
+/// the checkpoint.
+pub fn prepare(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<Lock> {
     let directory = &config.output.directory;
     let missing: Vec<&Path> =
         directory.ancestors().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
-    let blank = fs::read_dir(directory).map_or(!missing.is_empty(), |mut entries| entries.next().is_none());
     let made = fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, &error));
-    let begun = made.and_then(|()| begin(config, checkpoint, global));
-    if begun.is_err() {
-        // The error to report is the one above; what cannot be removed stays.
-        if blank {
-            let _ = fs::remove_dir_all(directory.join(SNAPSHOTS));
-            for path in [checkpoint::path_in(directory, global.step), history::path_in(directory)] {
-                for path in [temporary_name(&path), path] {
-                    let _ = fs::remove_file(path);
-                }
-            }
+    let prepared = made.and_then(|()| Lock::take(directory)).and_then(|lock| {
+        let blank =
+            fs::read_dir(directory).is_ok_and(|entries| entries.flatten().all(|entry| entry.file_name() == lock::NAME));
+        let begun = begin(config, checkpoint, global);
+        if begun.is_err() && blank {
+            remove_beginning(directory, global);
         }
+        begun.map(|()| lock)
+    });
+    if prepared.is_err() {
+        // Those in which another run has put something stay.
         for folder in missing {
             let _ = fs::remove_dir(folder);
         }
     }
-    begun
+    prepared
+}
+
+/// Remove what was taken over into an empty directory. The error to report is the one before; what cannot be removed stays.
+fn remove_beginning(directory: &Path, global: &GlobalState) {
+    let _ = fs::remove_dir_all(directory.join(SNAPSHOTS));
+    for path in [checkpoint::path_in(directory, global.step), history::path_in(directory)] {
+        for path in [temporary_name(&path), path] {
+            let _ = fs::remove_file(path);
+        }
+    }
 }
 
 fn begin(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {
