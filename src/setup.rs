@@ -96,6 +96,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         particles: count,
         quasi_static: None,
         previous_time: None,
+        previous_stage: None,
     };
     programme(config).enter(&mut global);
     begin_ledgers(config, &global, &mut particles);
@@ -126,6 +127,39 @@ fn broadcast_states(comm: &Communicator, states: &[ParticleState]) -> Vec<Partic
 fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
     let start = |rank| redistribute::block_start(rank, total, comm.size());
     start(comm.rank())..start(comm.rank() + 1)
+}
+
+/// Whether a checkpoint leads to the ends of stages that the input names.
+pub enum Ends {
+    /// It does.
+    Kept,
+    /// Older checkpoints of its complete run do, of which the last stage now ends later; what has changed.
+    PutOff(String),
+    /// It does not: the end of a stage that is over has changed; which.
+    Changed(String),
+}
+
+/// Compare the ends of stages that were over at a checkpoint with those of the input. Where the last stage of a complete run
+/// now ends later, and a run without stop would have come by this state too, the checkpoint is taken back into that stage.
+///
+/// # Errors
+/// An input that the checkpoint holds cannot be read.
+pub fn compare_ends(config: &Config, checkpoint: &mut Checkpoint) -> Result<Ends> {
+    let global = &mut checkpoint.global;
+    let passed = begun::passed_ends(&checkpoint.config_resolved, &config.resolved, global)?;
+    if passed.changes.is_empty() {
+        return Ok(Ends::Kept);
+    }
+    let changes = passed.changes.join(", ");
+    let programme = programme(config);
+    let Some(reopened) = programme.reopened(global).filter(|_| passed.last_of_complete) else {
+        return Ok(Ends::Changed(changes));
+    };
+    if programme.quasi_static_stage(&reopened).is_some() || !LoadProgramme::last_step_was_whole(global) {
+        return Ok(Ends::PutOff(changes));
+    }
+    *global = reopened;
+    Ok(Ends::Kept)
 }
 
 /// A checkpoint as initial state.

@@ -135,3 +135,77 @@ fn a_restart_into_a_new_directory_can_be_gone_on_with_at_once() {
     let names = |directory: &Path| listing(directory).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
     assert_eq!(names(&directory), names(&whole));
 }
+
+#[test]
+fn a_complete_run_that_is_restarted_unchanged_changes_no_file() {
+    let (directory, first) = complete("whole");
+    let before = contents(&directory);
+    for ranks in [1, 2] {
+        let again = restart(&directory, &directory, ranks, &SNAPSHOTS);
+        assert!(again.status.success() && text(&again).contains("nothing to do"), "{}", text(&again));
+        assert_eq!(digest_of(&again), digest_of(&first));
+        assert!(contents(&directory) == before, "{ranks} ranks");
+    }
+    // A kill came before the end was written down: then it is.
+    fs::remove_file(directory.join("status.toml")).expect("it is there");
+    let again = restart(&directory, &directory, 1, &SNAPSHOTS);
+    assert!(again.status.success(), "{}", text(&again));
+    assert_eq!(listing(&directory), before.0);
+}
+
+/// As `listing`, with the bytes of checkpoints and snapshots.
+fn contents(directory: &Path) -> (Vec<(String, Vec<u8>)>, Vec<Vec<u8>>) {
+    let names = listing(directory).into_iter().map(|(name, _)| directory.join(name));
+    let inside =
+        listing(&directory.join("snapshots")).into_iter().map(|(name, _)| directory.join("snapshots").join(name));
+    (listing(directory), names.chain(inside).map(|path| fs::read(path).expect("it is there")).collect())
+}
+
+#[test]
+fn a_complete_run_goes_on_to_a_later_end_as_if_it_had_been_there() {
+    let later = |end: &'static str| [&SNAPSHOTS[..], &["--set", end]].concat();
+    let steps = later("stage.1.steps=700");
+    let reference = scratch("reference").join("run");
+    let whole = run(&reference, 1, &steps);
+    assert!(whole.status.success(), "{}", text(&whole));
+    let ends = |directory: &Path, output: &Output| {
+        assert!(output.status.success(), "{}", text(output));
+        let names = |directory: &Path| listing(directory).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        (digest_of(output), history_of(directory), names(&directory.join("snapshots")))
+    };
+    // From the last state, as its last step was not cut.
+    let (directory, _) = complete("steps");
+    let again = restart(&directory, &directory, 2, &steps);
+    assert!(text(&again).contains("(step 1000,"), "{}", text(&again));
+    assert_eq!(ends(&directory, &again), ends(&reference, &whole));
+    // And on, by further stages or not at all.
+    let earlier = restart(&directory, &directory, 2, &SNAPSHOTS);
+    assert_refused(&earlier, &["stage.1.steps is 400 and was 700", "a checkpoint file from before that end"]);
+    let begun = restart(&directory, &directory, 1, &later("stage.0.steps=700"));
+    assert_refused(&begun, &["stage.0.steps is 700 and was 600", "put the end back"]);
+    assert_eq!(ends(&directory, &again), ends(&reference, &whole));
+
+    // From the checkpoint before, as the last step was cut to end with the stage.
+    let [short, long] = ["stage.1.duration=0.6 ms", "stage.1.duration=1.2 ms"];
+    let unlimited = ["--set", "stage.1.steps=100000"];
+    let set = |duration: &'static str| [&later(duration)[..], &unlimited].concat();
+    let whole = run(&reference, 1, &set(long));
+    let directory = scratch("duration").join("run");
+    let first = run(&directory, 1, &set(short));
+    assert!(first.status.success(), "{}", text(&first));
+    let last = listing(&directory).into_iter().map(|(name, _)| name).filter(|name| name.ends_with(".h5")).max();
+    let last = directory.join(last.expect("a checkpoint"));
+    let refused = restart(&last, &directory, 2, &set(long));
+    assert_refused(&refused, &["stage.1.duration is 0.0012 and was 0.0006", "a checkpoint file from before that end"]);
+    let again = restart(&directory, &directory, 2, &set(long));
+    assert!(text(&again).contains("is passed over, the run has ended there"), "{}", text(&again));
+    assert_eq!(ends(&directory, &again), ends(&reference, &whole));
+    // No such checkpoint is left.
+    let only = ["--set", "output.checkpoint_steps=0"];
+    let alone = scratch("alone").join("run");
+    assert!(run(&alone, 1, &[&set(short)[..], &only].concat()).status.success());
+    let before = contents(&alone);
+    let refused = restart(&alone, &alone, 2, &[&set(long)[..], &only].concat());
+    assert_refused(&refused, &["no older checkpoint is left", "add a stage", "without --restart"]);
+    assert!(contents(&alone) == before);
+}

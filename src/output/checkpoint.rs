@@ -103,14 +103,15 @@ pub fn write(
     Ok(path)
 }
 
-/// The newest valid checkpoint of a run directory. A newer one that is damaged is passed over with a
-/// warning. Collective.
+/// The newest valid checkpoint of a run directory before this step (`None`: of all). A newer one that is damaged is passed
+/// over with a warning. Collective.
 ///
 /// # Errors
 /// [`Error::Checkpoint`] on every rank when there is none that can be used.
-pub fn latest(comm: &Communicator, directory: &Path) -> Result<Latest> {
+pub fn latest(comm: &Communicator, directory: &Path, before: Option<u64>) -> Result<Latest> {
     let found = if comm.rank() == 0 { steps(directory) } else { Ok(Vec::new()) };
-    let found = agree(comm, found)?;
+    let mut found = agree(comm, found)?;
+    found.retain(|step| before.is_none_or(|before| *step < before));
     let mut bytes: Vec<u8> = found.iter().flat_map(|step| step.to_le_bytes()).collect();
     comm.broadcast(0, &mut bytes);
     let mut warnings = Vec::new();
@@ -157,7 +158,7 @@ pub fn read(comm: &Communicator, path: &Path) -> Result<Checkpoint> {
 /// As [`latest`] and [`read`].
 pub fn digest_of(path: &Path) -> Result<Digest> {
     let comm = Communicator::single();
-    let file = if path.is_dir() { latest(&comm, path)?.path } else { path.to_path_buf() };
+    let file = if path.is_dir() { latest(&comm, path, None)?.path } else { path.to_path_buf() };
     Ok(read(&comm, &file)?.digest)
 }
 

@@ -4,6 +4,7 @@
 use super::lock::{self, Lock};
 use crate::config::Config;
 use crate::error::{Error, Result};
+use crate::output::digest::Digest;
 use crate::output::files::{publish, temporary_name};
 use crate::output::{checkpoint, history, snapshot};
 use crate::state::GlobalState;
@@ -51,6 +52,19 @@ fn remove_beginning(directory: &Path, global: &GlobalState) {
             let _ = fs::remove_file(path);
         }
     }
+}
+
+/// The directory is that of the checkpoint, and holds all that a run writes which ends there. Changes nothing.
+#[must_use]
+pub fn is_finished(config: &Config, checkpoint: &Path, global: &GlobalState, digest: Digest) -> bool {
+    let directory = &config.output.directory;
+    let status = fs::read_to_string(directory.join("status.toml")).unwrap_or_default();
+    let status: toml::Table = status.parse().unwrap_or_default();
+    let says = |key: &str, wanted: &str| status.get(key).and_then(toml::Value::as_str) == Some(wanted);
+    is_same(folder_of(checkpoint), directory)
+        && says("state", "finished")
+        && says("digest", &digest.to_string())
+        && history::check(directory, global.history_rows + 1).is_ok()
 }
 
 fn begin(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {

@@ -1,4 +1,4 @@
-use super::check;
+use super::{check, passed_ends};
 use crate::output::digest::tests::sample;
 use crate::state::GlobalState;
 
@@ -85,5 +85,35 @@ fn ends_of_stages_output_and_keys_of_newer_programs_may_change() {
         ("count = 60\n", "count = 60\nnovelty = 1\n"),
     ] {
         assert_eq!(refused(from, to, &state(0, 7)), None, "{to}");
+    }
+}
+
+const CYCLES: &str = "[[stage]]\ncycles = 2\n[[stage.part]]\nstrain_rate = [1.0, 0.0, 0.0]\nsteps = 5\n\
+    [[stage.part]]\nstrain_rate = [-1.0, 0.0, 0.0]\nsteps = 6\n[[stage]]\nstrain_rate = [0.0, 0.0, 0.0]\nsteps = 7\n";
+
+#[test]
+fn stages_of_cycles_are_counted_as_they_run() {
+    let faster = CYCLES.replace("[-1.0", "[-2.0");
+    assert!(check(CYCLES, &faster, &state(1, 0)).is_ok());
+    let message = check(CYCLES, &faster, &state(3, 2)).unwrap_err().to_string();
+    assert_eq!(message.matches("stage.0.part.1.strain_rate is").count(), 1, "{message}");
+    assert!(check(CYCLES, &CYCLES.replace("[0.0, 0.0, 0.0]", "[3.0, 0.0, 0.0]"), &state(4, 0)).is_ok());
+    assert!(check(CYCLES, &CYCLES.replace("[0.0, 0.0, 0.0]", "[3.0, 0.0, 0.0]"), &state(4, 1)).is_err());
+}
+
+#[test]
+fn changed_ends_of_stages_that_are_over_are_found() {
+    for (from, to, stage, change, last) in [
+        ("steps = 7", "steps = 8", 5, "stage.1.steps is 8 and was 7", true),
+        ("steps = 7", "duration = 8.0", 5, "stage.1.duration is 8.0 and was not there", true),
+        ("steps = 7", "steps = 8", 4, "", false),
+        ("steps = 6", "steps = 8", 5, "stage.0.part.1.steps is 8 and was 6", false),
+        ("steps = 6", "steps = 8", 1, "", false),
+        ("steps = 5", "steps = 8", 1, "stage.0.part.0.steps is 8 and was 5", false),
+    ] {
+        let found = passed_ends(CYCLES, &CYCLES.replace(from, to), &state(stage, 0)).unwrap();
+        assert!(found.changes.is_empty() == change.is_empty(), "{:?}", found.changes);
+        assert!(found.changes.join(", ").contains(change), "{:?}", found.changes);
+        assert_eq!(found.last_of_complete, last, "{to} in {stage}");
     }
 }
