@@ -119,13 +119,10 @@ pub fn main() -> i32 {
             return delivered(error.print()).map_or_else(|fault| report(&fault), |()| error.exit_code());
         }
     };
-    let command = match arguments.command {
-        Some(command) => command,
-        None => {
-            // Before MPI starts, which takes its time: an unheard signal kills.
-            let signals = Signals::listen();
-            return parallel(|comm| run_command(comm, &arguments.run, signals));
-        }
+    let Some(command) = arguments.command else {
+        // Before MPI starts, which takes its time: an unheard signal kills.
+        let signals = Signals::listen();
+        return parallel(|comm| run_command(comm, &arguments.run, signals));
     };
     let done = match command {
         Command::Check { config, input } => {

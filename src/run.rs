@@ -161,8 +161,8 @@ fn fitting_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Resu
         let step = read.global.step;
         let refused = |changes: &str, older: &str| {
             Error::Input(format!(
-                "the checkpoint {} does not fit this input: {changes}, and that stage had ended by step {step}: {older}put \
-                 the end back and add a stage that goes on from there, or begin anew without --restart",
+                "the checkpoint {} does not fit this input: {changes}, for which step {step} is too late: {older}put the \
+                 end back and add a stage that goes on from there, or begin anew without --restart",
                 file.display()
             ))
         };
@@ -170,7 +170,10 @@ fn fitting_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Resu
             Ends::Kept => return Ok((file, read)),
             Ends::PutOff(changes) if path.is_dir() => {
                 if comm.rank() == 0 {
-                    eprintln!("dem-mpi: {} is passed over, the run has ended there: {changes}", file.display());
+                    eprintln!(
+                        "dem-mpi: {} is passed over, as it is too late for another end: {changes}",
+                        file.display()
+                    );
                 }
                 passed_over = Some((step, refused(&changes, "no older checkpoint is left; ")));
             }

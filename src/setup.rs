@@ -133,7 +133,8 @@ fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
 pub enum Ends {
     /// It does.
     Kept,
-    /// Older checkpoints of its complete run do, of which the last stage now ends later; what has changed.
+    /// Older checkpoints of its run do: the last stage of a complete run now ends later, or the last increment of a stage would
+    /// have been another; what has changed.
     PutOff(String),
     /// It does not: the end of a stage that is over has changed; which.
     Changed(String),
@@ -151,6 +152,9 @@ pub fn compare_ends(config: &Config, checkpoint: &mut Checkpoint) -> Result<Ends
         return Ok(Ends::Kept);
     }
     let changes = passed.changes.join(", ");
+    if passed.increment_was_cut {
+        return Ok(Ends::PutOff(changes));
+    }
     let programme = programme(config);
     let Some(reopened) = programme.reopened(global).filter(|_| passed.last_of_complete) else {
         return Ok(Ends::Changed(changes));

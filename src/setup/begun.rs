@@ -16,15 +16,18 @@ const OF_STAGE: [&str; 3] = ["routine", "strain_rate", "strain_increment"];
 /// Keys that end a stage.
 const OF_END: [&str; 5] = ["duration", "until_strain", "until_stress", "steps", "increments"];
 
-/// Changed ends of stages that are over.
+/// Changed ends of stages that have acted already.
 pub struct PassedEnds {
     /// What has changed.
     pub changes: Vec<String>,
     /// The run was complete, and only its last stage ends otherwise.
     pub last_of_complete: bool,
+    /// No stage that is over ends otherwise, but the running one: its end has cut the increment in which it is.
+    pub increment_was_cut: bool,
 }
 
-/// Compare the ends of stages that are over with those that the checkpoint's input has, both resolved.
+/// Compare the ends of stages that are over, or in their last increment, with those that the checkpoint's input has, both
+/// resolved.
 ///
 /// # Errors
 /// An input cannot be read.
@@ -42,7 +45,21 @@ pub fn passed_ends(before: &str, now: &str, global: &GlobalState) -> Result<Pass
         }
         last_of_complete &= index + 1 == before.len() || changes.0.len() == known;
     }
-    Ok(PassedEnds { changes: changes.0, last_of_complete })
+    let over = changes.0.len();
+    if let (Some((label, old)), 0) =
+        (before.get(global.stage).filter(|(_, old)| is_in_last_increment(old, global)), over)
+    {
+        let new = now.get(global.stage).map_or_else(Table::new, |(_, new)| new.clone());
+        changes.of_keys(&format!("{label}."), old, &new, &["until_strain"]);
+    }
+    Ok(PassedEnds { last_of_complete, increment_was_cut: changes.0.len() > over, changes: changes.0 })
+}
+
+/// The cell has the strain that ends a quasi-static stage, but no equilibrium yet.
+fn is_in_last_increment(stage: &Table, global: &GlobalState) -> bool {
+    let end = |axis: &str| stage.get("until_strain").and_then(|end| end.get(axis)).and_then(Value::as_float);
+    global.quasi_static.is_some_and(|state| state.substep > 0)
+        && ["x", "y", "z"].iter().zip(global.strain).any(|(axis, strain)| end(axis) == Some(strain))
 }
 
 fn read(text: &str) -> Result<Table> {

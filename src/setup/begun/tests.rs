@@ -1,6 +1,6 @@
 use super::{check, passed_ends};
 use crate::output::digest::tests::sample;
-use crate::state::GlobalState;
+use crate::state::{GlobalState, QuasiStaticState};
 
 const INPUT: &str = "seed = 1\n[packing.random_close]\ncontraction_rate = 0.001\n[cell]\nsolid_fraction = 0.6\n\
     [[species]]\nname = \"a\"\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
@@ -116,4 +116,19 @@ fn changed_ends_of_stages_that_are_over_are_found() {
         assert!(found.changes.join(", ").contains(change), "{:?}", found.changes);
         assert_eq!(found.last_of_complete, last, "{to} in {stage}");
     }
+}
+
+#[test]
+fn an_increment_that_a_changed_end_has_cut_is_found() {
+    let input = "[[stage]]\nstrain_increment = [0.0, 0.0, 2e-4]\n[stage.until_strain]\nz = 0.0041\n";
+    let later = input.replace("0.0041", "0.006");
+    let within = |strain: f64, substep: u64| {
+        let progress =
+            QuasiStaticState { increments: 20, stage_start_increments: 0, substep, mixing: 0.0, downhill: 0 };
+        GlobalState { strain: [0.0, 0.0, strain], quasi_static: Some(progress), ..state(0, 7) }
+    };
+    let cut = passed_ends(input, &later, &within(0.0041, 5)).unwrap();
+    assert!(cut.increment_was_cut && cut.changes.join("").contains("stage.0.until_strain.z is 0.006 and was 0.0041"));
+    assert!(!passed_ends(input, input, &within(0.0041, 5)).unwrap().increment_was_cut);
+    assert!(!passed_ends(input, &later, &within(0.004, 5)).unwrap().increment_was_cut);
 }
