@@ -122,8 +122,10 @@ pub fn main() -> i32 {
     let Some(command) = arguments.command else {
         // Before MPI starts, which takes its time: an unheard signal kills.
         let signals = Signals::listen();
+        run::let_through();
         return parallel(|comm| run_command(comm, &arguments.run, signals));
     };
+    run::let_through();
     let done = match command {
         Command::Check { config, input } => {
             input.load(&config).and_then(|config| print(&config::sheet::sheet(&config)))

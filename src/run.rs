@@ -18,7 +18,7 @@ use crate::simulation::{Requests, Simulation, Stage};
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
-pub use signals::Signals;
+pub use signals::{Signals, hold_back, let_through};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;

@@ -6,6 +6,7 @@ use common::{Run, data, digest_of, history_of, launch, listing, scratch, start, 
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 use std::os::unix::fs::OpenOptionsExt as _;
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -117,6 +118,16 @@ fn sigusr1_while_the_input_is_read_or_mpi_starts_is_heard() {
         let output = wait(child);
         assert_eq!(output.status.code(), Some(75), "{}: {}", pipe.display(), text(&output));
     }
+}
+
+#[test]
+fn sigusr1_ends_a_command_that_does_not_listen() {
+    let config = pipe(&scratch("check"), "input.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dem-mpi"));
+    let mut child = command.arg("check").arg(&config).spawn().expect("the program starts");
+    let _file = opened(&config, &mut child).expect("it reads its input");
+    assert!(Command::new("kill").args(["-USR1", &child.id().to_string()]).status().expect("kill starts").success());
+    assert_eq!(wait(child).status.signal(), Some(libc::SIGUSR1));
 }
 
 #[test]

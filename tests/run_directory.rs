@@ -6,6 +6,7 @@ use common::{Run, data, digest_of, history_of, launch, listing, scratch, start, 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::time::SystemTime;
 
 /// Snapshots at steps 0, 300, 600, 900 and at the end.
 const SNAPSHOTS: [&str; 2] = ["--set", "output.snapshots=300 steps"];
@@ -156,11 +157,12 @@ fn a_complete_run_that_is_restarted_unchanged_changes_no_file() {
     assert_eq!(listing(&directory), names);
 }
 
-/// Paths and bytes of all files of a run, checkpoints and snapshots among them.
-fn contents(directory: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+/// Paths, times and bytes of all files of a run, checkpoints and snapshots among them.
+fn contents(directory: &Path) -> Vec<(PathBuf, SystemTime, Vec<u8>)> {
     let folders = [directory.to_path_buf(), directory.join("snapshots")].into_iter().filter(|folder| folder.exists());
     let paths = folders.flat_map(|folder| listing(&folder).into_iter().map(move |(name, _)| folder.join(name)));
-    paths.map(|path| (path.clone(), fs::read(path).expect("it is there"))).collect()
+    let time = |path: &Path| fs::metadata(path).and_then(|data| data.modified()).expect("it is there");
+    paths.map(|path| (path.clone(), time(&path), fs::read(path).expect("it is there"))).collect()
 }
 
 #[test]
