@@ -123,8 +123,13 @@ fn check_free(to: &Path, checkpoint: &Path) -> Result<()> {
 /// The snapshots, the checkpoint and the table of one directory also in the other, so that this one tells the whole run and
 /// can be gone on with from now on.
 fn take_over(from: &Path, to: &Path, checkpoint: &Path, step: u64) -> Result<()> {
-    if let Ok(entries) = fs::read_dir(from.join(SNAPSHOTS)) {
-        let folder = to.join(SNAPSHOTS);
+    let (shown, folder) = (from.join(SNAPSHOTS), to.join(SNAPSHOTS));
+    if is_same(&shown, &folder) {
+        let message =
+            "is that of the checkpoint's run, whose snapshots would be overwritten; remove the link".to_owned();
+        return Err(Error::File { path: folder, message });
+    }
+    if let Ok(entries) = fs::read_dir(shown) {
         fs::create_dir_all(&folder).map_err(|error| failed("make the folder", &folder, &error))?;
         for entry in entries.flatten().filter(|entry| entry.path().is_file()) {
             copy(&entry.path(), &folder.join(entry.file_name()))?;
