@@ -5,7 +5,7 @@ use crate::config::{self, Config};
 use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
 use crate::output::{checkpoint, plot};
-use crate::run::{self, Outcome, RunOptions};
+use crate::run::{self, Outcome, RunOptions, Signals};
 use crate::scaling::{self, ScalingOptions};
 use crate::verify;
 use crate::verify::becker2021::Becker2021Options;
@@ -119,10 +119,13 @@ pub fn main() -> i32 {
             return delivered(error.print()).map_or_else(|fault| report(&fault), |()| error.exit_code());
         }
     };
-    let command = match arguments.command {
-        Some(command) => command,
-        None => return parallel(|comm| run_command(comm, &arguments.run)),
+    let Some(command) = arguments.command else {
+        // Before MPI starts, which takes its time: an unheard signal kills.
+        let signals = Signals::listen();
+        run::let_through();
+        return parallel(|comm| run_command(comm, &arguments.run, signals));
     };
+    run::let_through();
     let done = match command {
         Command::Check { config, input } => {
             input.load(&config).and_then(|config| print(&config::sheet::sheet(&config)))
@@ -197,12 +200,13 @@ fn parallel(work: impl FnOnce(&Communicator) -> Result<i32>) -> i32 {
     codes[0] as i32
 }
 
-fn run_command(comm: &Communicator, arguments: &RunArguments) -> Result<i32> {
+fn run_command(comm: &Communicator, arguments: &RunArguments, signals: Result<Signals>) -> Result<i32> {
+    let signals = agree(comm, signals)?;
     let Some(path) = &arguments.config else {
         return Err(Error::Input("no configuration file given; see `dem-mpi --help`".into()));
     };
     let config = Arc::new(agree(comm, arguments.input.load(path))?);
-    let outcome = run::run(comm, &config, &RunOptions { restart: arguments.restart.clone() })?;
+    let outcome = run::run(comm, &config, &RunOptions { restart: arguments.restart.clone() }, signals)?;
     Ok(match outcome {
         Outcome::Finished => 0,
         Outcome::Requeue => EXIT_REQUEUE,

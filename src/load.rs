@@ -3,7 +3,7 @@
 mod quasi_static;
 
 use crate::config::{AxisControl, Kinematics, MAX_STRAIN_PER_STEP, Routine, Stage};
-use crate::state::GlobalState;
+use crate::state::{GlobalState, StageStart};
 use quasi_static::{enter_quasi_static, is_over_quasi_static, next_equilibrium_strain};
 
 /// What one step does to time and cell.
@@ -47,6 +47,12 @@ impl LoadProgramme {
                 warnings
                     .push(format!("stage {number} (\"{name}\") ended with its first state: its end was passed before"));
             }
+            global.previous_stage = Some(StageStart {
+                time: global.stage_start_time,
+                step: global.stage_start_step,
+                strain: global.stage_start_strain,
+                stress: global.stage_start_stress,
+            });
             global.stage += 1;
             global.stage_start_time = global.time;
             global.stage_start_step = global.step;
@@ -68,6 +74,29 @@ impl LoadProgramme {
             AxisControl::StrainRate(rate) => rate,
             AxisControl::Stress { .. } => 0.0,
         });
+    }
+
+    /// The end of a run taken back into its last stage; `None` if that stage is over there, or where it began is unknown.
+    #[must_use]
+    pub fn reopened(&self, global: &GlobalState) -> Option<GlobalState> {
+        let (index, start) = (global.stage.checked_sub(1)?, global.previous_stage?);
+        let reopened = GlobalState {
+            stage: index,
+            stage_start_time: start.time,
+            stage_start_step: start.step,
+            stage_start_strain: start.strain,
+            stage_start_stress: start.stress,
+            previous_stage: None,
+            ..global.clone()
+        };
+        self.stages.get(index).filter(|stage| !is_over(stage, &reopened)).map(|_| reopened)
+    }
+
+    /// The last step was as long as wanted, not cut so that a stage ended with it.
+    #[must_use]
+    pub fn last_step_was_whole(global: &GlobalState) -> bool {
+        global.previous_time_step == global.time_step
+            && global.previous_time.is_some_and(|before| before + global.time_step == global.time)
     }
 
     /// The running stage if it is quasi-static.

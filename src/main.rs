@@ -10,6 +10,8 @@ const TUNABLES: &str = "GLIBC_TUNABLES";
 const SETTINGS: &str = "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=4194304";
 
 fn main() {
+    // Until it is known who is to hear it; the second beginning would else be a second time in which it kills.
+    dem_mpi::run::hold_back();
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     with_large_pages();
     std::process::exit(dem_mpi::cli::main());

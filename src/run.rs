@@ -1,23 +1,24 @@
 //! A run from input to final digest: outer loop over steps, what is written when, signals, restart.
 
+mod directory;
 mod efforts;
 mod inertia;
+mod lock;
 mod output;
 mod signals;
 
 use crate::config::{Config, Interval, Routine};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
 use crate::force::observe::Wanted;
-use crate::output::checkpoint;
-use crate::output::digest;
-use crate::setup::{self, Initial};
+use crate::output::checkpoint::{self, Checkpoint};
+use crate::output::digest::{self, Digest};
+use crate::setup::{self, Ends, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
-use crate::state::GlobalState;
 use efforts::Efforts;
 pub use efforts::{peak_bytes, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
-use signals::Signals;
+pub use signals::{Signals, hold_back, let_through};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -40,18 +41,28 @@ pub enum Outcome {
     Stopped(i32),
 }
 
-/// Run a configuration on the ranks of `comm`; ranks that the grid has no use for stay idle.
+/// Run a configuration on the ranks of `comm`; ranks that the grid has no use for stay idle. Every rank listens to signals,
+/// idle ones too, as mpirun forwards them to all.
 ///
 /// # Errors
 /// Whatever went wrong, the same error on every rank that computes.
-pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> Result<Outcome> {
-    // First of all, and on idle ranks too: mpirun forwards signals to every rank, and an unheard one kills.
-    let signals = agree(comm, Signals::listen())?;
+pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions, signals: Signals) -> Result<Outcome> {
     let threads = set_up_threads(comm, config);
     let mut efforts = Efforts::begin();
     let started = Instant::now();
     let (initial, checkpoint) = match &options.restart {
-        Some(path) => from_checkpoint(comm, config, path).map(|(initial, file)| (initial, Some(file)))?,
+        Some(path) => {
+            let restart = from_checkpoint(comm, config, path)?;
+            if is_finished(comm, config, &restart) {
+                signals.heed();
+                if comm.rank() == 0 {
+                    say_nothing_to_do(restart.initial.global.step);
+                    say!("digest {}", restart.digest);
+                }
+                return Ok(Outcome::Finished);
+            }
+            (restart.initial, Some(restart.file))
+        }
         None => (setup::from_packing(comm, config)?, None),
     };
     efforts.set_up(if checkpoint.is_some() { "checkpoint read" } else { "packing" }, started.elapsed().as_secs_f64());
@@ -82,10 +93,11 @@ pub fn run(comm: &Communicator, config: &Arc<Config>, options: &RunOptions) -> R
     // Only now that nothing speaks against the run does it touch what lies in its directory.
     signals.heed();
     let prepared = match simulation.comm().rank() {
-        0 => prepare(config, checkpoint.as_deref(), simulation.global()),
-        _ => Ok(()),
+        0 => directory::prepare(config, checkpoint.as_deref(), simulation.global()).map(Some),
+        _ => Ok(None),
     };
-    agree(simulation.comm(), prepared)?;
+    // Until the last file is written.
+    let _lock = agree(simulation.comm(), prepared)?;
     Run::new(simulation, Arc::clone(config), signals, efforts)?.drive()
 }
 
@@ -108,16 +120,15 @@ fn automatic_threads(ranks: usize) -> usize {
     (cores / local.max(1)).max(1)
 }
 
-fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<(Initial, PathBuf)> {
-    let mut file = path.to_path_buf();
-    if path.is_dir() {
-        let latest = checkpoint::latest(comm, path)?;
-        for warning in latest.warnings.iter().filter(|_| comm.rank() == 0) {
-            eprintln!("dem-mpi: warning: {warning}");
-        }
-        file = latest.path;
-    }
-    let read = checkpoint::read(comm, &file)?;
+/// What a restart begins with.
+struct Restart {
+    file: PathBuf,
+    digest: Digest,
+    initial: Initial,
+}
+
+fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<Restart> {
+    let (file, read) = fitting_checkpoint(comm, config, path)?;
     if comm.rank() == 0 {
         eprintln!(
             "dem-mpi: restart from {} (step {}, time {:.6e} s)",
@@ -126,19 +137,68 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
             read.global.time
         );
     }
-    Ok((agree(comm, setup::from_checkpoint(config, read))?, file))
+    let digest = read.digest;
+    Ok(Restart { file, digest, initial: agree(comm, setup::from_checkpoint(config, read))? })
 }
 
-fn prepare(config: &Config, checkpoint: Option<&Path>, global: &GlobalState) -> Result<()> {
-    if let Some(file) = checkpoint {
-        output::check_directory(config, file)?;
-        output::make_directory(config)?;
-        output::take_over(config, file)?;
-        output::check_beginning(config, global)?;
-    } else {
-        output::make_directory(config)?;
+/// The checkpoint given, or the newest of a run directory that leads to the ends of stages that the input names.
+fn fitting_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<(PathBuf, Checkpoint)> {
+    let mut file = path.to_path_buf();
+    let mut passed_over: Option<(u64, Error)> = None;
+    loop {
+        if path.is_dir() {
+            let latest =
+                match (checkpoint::latest(comm, path, passed_over.as_ref().map(|(step, _)| *step)), passed_over) {
+                    (Err(_), Some((_, reason))) => return Err(reason),
+                    (latest, _) => latest?,
+                };
+            for warning in latest.warnings.iter().filter(|_| comm.rank() == 0) {
+                eprintln!("dem-mpi: warning: {warning}");
+            }
+            file = latest.path;
+        }
+        let mut read = checkpoint::read(comm, &file)?;
+        let step = read.global.step;
+        let refused = |changes: &str, older: &str| {
+            Error::Input(format!(
+                "the checkpoint {} does not fit this input: {changes}, for which step {step} is too late: {older}put the \
+                 end back and add a stage that goes on from there, or begin anew without --restart",
+                file.display()
+            ))
+        };
+        match agree(comm, setup::compare_ends(config, &mut read))? {
+            Ends::Kept => return Ok((file, read)),
+            Ends::PutOff(changes) if path.is_dir() => {
+                if comm.rank() == 0 {
+                    eprintln!(
+                        "dem-mpi: {} is passed over, as it is too late for another end: {changes}",
+                        file.display()
+                    );
+                }
+                passed_over = Some((step, refused(&changes, "no older checkpoint is left; ")));
+            }
+            Ends::PutOff(changes) | Ends::Changed(changes) => {
+                return Err(refused(&changes, "give a checkpoint file from before that end, "));
+            }
+        }
     }
-    output::clear_future(config, global)
+}
+
+/// Whether nothing is left to do in the run directory. Collective.
+fn is_finished(comm: &Communicator, config: &Config, restart: &Restart) -> bool {
+    let finished = comm.rank() == 0
+        && restart.initial.global.stage >= config.stages.len()
+        && directory::is_finished(config, &restart.file, &restart.initial.global, restart.digest);
+    let mut ranks = [i64::from(finished)];
+    comm.max_i64(&mut ranks);
+    ranks[0] != 0
+}
+
+fn say_nothing_to_do(step: u64) {
+    eprintln!(
+        "dem-mpi: all stages ended with step {step}: nothing to do; to go on, let the last stage of the input end later or \
+         add one"
+    );
 }
 
 /// A run in progress on one rank.
@@ -187,7 +247,7 @@ impl Run {
         }
         let step = self.simulation.global().step;
         if step > 0 && step == self.first_step && self.simulation.comm().rank() == 0 {
-            eprintln!("dem-mpi: all stages ended with step {step}: nothing to do; to go on, add a stage to the input");
+            say_nothing_to_do(step);
         }
         self.finish()
     }

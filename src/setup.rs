@@ -98,6 +98,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         particles: count,
         quasi_static: None,
         previous_time: None,
+        previous_stage: None,
     };
     programme(config).enter(&mut global);
     begin_ledgers(config, &global, &mut particles);
@@ -130,20 +131,48 @@ fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
     start(comm.rank())..start(comm.rank() + 1)
 }
 
+/// Whether a checkpoint leads to the ends of stages that the input names.
+pub enum Ends {
+    /// It does.
+    Kept,
+    /// Older checkpoints of its run do: the last stage of a complete run now ends later, or the last increment of a stage would
+    /// have been another; what has changed.
+    PutOff(String),
+    /// It does not: the end of a stage that is over has changed; which.
+    Changed(String),
+}
+
+/// Compare the ends of stages that were over at a checkpoint with those of the input. Where the last stage of a complete run
+/// now ends later, and a run without stop would have come by this state too, the checkpoint is taken back into that stage.
+///
+/// # Errors
+/// An input that the checkpoint holds cannot be read.
+pub fn compare_ends(config: &Config, checkpoint: &mut Checkpoint) -> Result<Ends> {
+    let global = &mut checkpoint.global;
+    let passed = begun::passed_ends(&checkpoint.config_resolved, &config.resolved, global)?;
+    if passed.changes.is_empty() {
+        return Ok(Ends::Kept);
+    }
+    let changes = passed.changes.join(", ");
+    if passed.increment_was_cut {
+        return Ok(Ends::PutOff(changes));
+    }
+    let programme = programme(config);
+    let Some(reopened) = programme.reopened(global).filter(|_| passed.last_of_complete) else {
+        return Ok(Ends::Changed(changes));
+    };
+    if programme.quasi_static_stage(&reopened).is_some() || !LoadProgramme::last_step_was_whole(global) {
+        return Ok(Ends::PutOff(changes));
+    }
+    *global = reopened;
+    Ok(Ends::Kept)
+}
+
 /// A checkpoint as initial state.
 ///
 /// # Errors
-/// The checkpoint belongs to another input (number of species or contact-memory width differ), or the input changes what
-/// no longer acts.
+/// The checkpoint belongs to another input (its species differ), or the input changes what no longer acts.
 pub fn from_checkpoint(config: &Config, checkpoint: Checkpoint) -> Result<Initial> {
-    let species = config.species.len() as u32;
-    if let Some(particle) = checkpoint.particles.iter().find(|p| p.species >= species) {
-        return Err(Error::Input(format!(
-            "the checkpoint does not fit this input: particle {} has species number {}, the input has {species} species; \
-             restart with the configuration of that run (config.resolved.toml beside the checkpoint)",
-            particle.id, particle.species
-        )));
-    }
     let Checkpoint { mut global, mut particles, memory, columns, config_resolved, .. } = checkpoint;
     let had_ledger = begun::check(&config_resolved, &config.resolved, &global)?;
     let programme = programme(config);

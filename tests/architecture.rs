@@ -60,6 +60,7 @@ const UNSAFE_FILES: &[(&str, &str)] = &[
     ("src/integrate/gather.rs", "output lines without a check for each: the ends name slots of the buffer"),
     ("src/integrate/leap_frog.rs", "calls into code compiled for vector instructions"),
     ("src/exchange/mpi_backend.rs", "MPI's own handles and calls that the safe layer lacks"),
+    ("src/run/signals.rs", "the mask of signals, which the safe layer lacks"),
     ("src/output/hdf5_file/reader.rs", "collective reads through the HDF5 C interface"),
     ("src/output/hdf5_file/writer.rs", "collective writes through the HDF5 C interface; reserving disk space"),
 ];

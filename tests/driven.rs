@@ -53,7 +53,7 @@ fn a_piston_pushes_a_free_grain_against_a_fixed_one() {
     let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &[]);
     assert!(output.status.success(), "{}", text(&output));
     let comm = Communicator::single();
-    let latest = checkpoint::latest(&comm, &directory).expect("the run leaves a checkpoint");
+    let latest = checkpoint::latest(&comm, &directory, None).expect("the run leaves a checkpoint");
     let state = checkpoint::read(&comm, &latest.path).expect("the checkpoint is valid");
     let x: Vec<f64> = state.particles.iter().map(|particle| particle.position[0]).collect();
     assert_eq!(x[0], 0.5, "the fixed grain stays");

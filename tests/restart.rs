@@ -2,9 +2,15 @@
 
 mod common;
 
-use common::{Run, data, digest_of, history_of, launch, scratch, start, text, wait, wait_for_file};
-use std::path::Path;
-use std::process::Command;
+use common::{Run, data, digest_of, history_of, launch, listing, scratch, start, text, wait, wait_for_file};
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
 
 /// Enough steps that a signal arrives in mid-run.
 const LONG: [&str; 6] =
@@ -55,6 +61,73 @@ fn rank_of(directory: &Path) -> String {
 #[test]
 fn sigusr1_checkpoints_and_asks_to_be_queued_again() {
     stop_and_restart("-USR1", false, &[75], 3);
+}
+
+/// A named pipe in which the program waits until it is opened for writing.
+fn pipe(folder: &Path, name: &str) -> PathBuf {
+    let path = folder.join(name);
+    let made = Command::new("mkfifo").arg(&path).status().expect("mkfifo starts");
+    assert!(made.success());
+    path
+}
+
+/// The other end of a pipe, once `child` reads it; `None` if it ends without.
+fn opened(pipe: &Path, child: &mut Child) -> Option<File> {
+    loop {
+        // Without a reader this fails at once.
+        match OpenOptions::new().write(true).custom_flags(libc::O_NONBLOCK).open(pipe) {
+            Ok(file) => return Some(file),
+            Err(_) if child.try_wait().expect("the program can be asked").is_some() => return None,
+            Err(_) => sleep(Duration::from_millis(10)),
+        }
+    }
+}
+
+#[test]
+fn sigusr1_while_the_input_is_read_or_mpi_starts_is_heard() {
+    let folder = scratch("early");
+    let program = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dem-mpi"));
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).args(["--set", "output.plots=false", "--output"]);
+        command
+    };
+    let input = std::fs::read(data("mixed_flow.toml")).expect("the input is there");
+    let (config, settings) = (pipe(&folder, "input.toml"), pipe(&folder, "mpi.conf"));
+    let reads = program().arg(folder.join("a")).arg(&config).spawn().expect("the program starts");
+    // Open MPI reads these settings when it starts; other libraries do not, and without MPI nothing does.
+    let mut starts = program();
+    starts.arg(folder.join("b")).arg(data("mixed_flow.toml")).env("OMPI_MCA_mca_base_param_files", &settings);
+    starts
+        .env("OMPI_COMM_WORLD_SIZE", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+    let starts = starts.spawn().expect("the program starts");
+    for (mut child, pipe, content) in [(reads, &config, input), (starts, &settings, Vec::new())] {
+        let Some(mut file) = opened(pipe, &mut child) else {
+            eprintln!("SKIPPED: this MPI does not read {}", pipe.display());
+            continue;
+        };
+        // Whoever else would read it finds an empty file.
+        std::fs::remove_file(pipe).expect("it is there");
+        std::fs::write(pipe, "").expect("the build folder can be written");
+        assert!(Command::new("kill").args(["-USR1", &child.id().to_string()]).status().expect("kill starts").success());
+        // Either it is dead then or it has heard.
+        sleep(Duration::from_millis(200));
+        let _ = file.write_all(&content);
+        drop(file);
+        let output = wait(child);
+        assert_eq!(output.status.code(), Some(75), "{}: {}", pipe.display(), text(&output));
+    }
+}
+
+#[test]
+fn sigusr1_ends_a_command_that_does_not_listen() {
+    let config = pipe(&scratch("check"), "input.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dem-mpi"));
+    let mut child = command.arg("check").arg(&config).spawn().expect("the program starts");
+    let _file = opened(&config, &mut child).expect("it reads its input");
+    assert!(Command::new("kill").args(["-USR1", &child.id().to_string()]).status().expect("kill starts").success());
+    assert_eq!(wait(child).status.signal(), Some(libc::SIGUSR1));
 }
 
 #[test]
@@ -153,22 +226,6 @@ fn a_stage_added_to_a_complete_run_is_run_as_if_it_had_been_there() {
     assert!(matches!(relaxed.status.code(), Some(0 | 1)) && !text(&relaxed).contains("panicked"), "{}", text(&relaxed));
 }
 
-/// Names and contents of what lies in a run directory, but for checkpoints, of which only the names count.
-fn listing(directory: &Path) -> Vec<(String, Vec<u8>)> {
-    let entries = std::fs::read_dir(directory).expect("the directory can be read").flatten();
-    let mut files: Vec<_> = entries
-        .filter(|entry| entry.path().is_file())
-        .map(|entry| {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let content =
-                if name.ends_with(".h5") { Vec::new() } else { std::fs::read(entry.path()).unwrap_or_default() };
-            (name, content)
-        })
-        .collect();
-    files.sort();
-    files
-}
-
 #[test]
 fn a_run_that_cannot_begin_leaves_an_earlier_one_as_it_was() {
     let config = data("mixed_flow.toml");
@@ -197,6 +254,35 @@ fn a_run_that_cannot_begin_leaves_an_earlier_one_as_it_was() {
     let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &directory, &restart);
     assert!(!output.status.success() && text(&output).contains("history.csv"), "{}", text(&output));
     assert_eq!(listing(&directory), before);
+}
+
+#[test]
+fn other_species_than_those_of_the_checkpoint_are_refused() {
+    let config = data("mixed_flow.toml");
+    let folder = scratch("species");
+    let directory = folder.join("run");
+    let output = launch(&Run { config: &config, ranks: 1, threads: 1 }, &directory, &[]);
+    assert!(output.status.success(), "{}", text(&output));
+    let before = listing(&directory);
+    let whole = std::fs::read_to_string(&config).expect("the input is text");
+    let starts: Vec<usize> = whole.match_indices("[[species]]").map(|(at, _)| at).collect();
+    let end = whole.find("[contact.normal").expect("then laws");
+    let (hard, soft) = (&whole[starts[0]..starts[1]], &whole[starts[1]..end]);
+    let third = "[[species]]\nname = \"third\"\nmaterial = \"hard\"\nradius = \"1 mm\"\ncount = 1\n\n";
+    for (species, named) in [
+        ([soft, hard, ""], "the species are \"soft\", \"hard\" and were \"hard\", \"soft\""),
+        ([hard, soft, third], "the species are \"hard\", \"soft\", \"third\" and were \"hard\", \"soft\""),
+        ([hard, "", ""], "the species are \"hard\" and were \"hard\", \"soft\""),
+    ] {
+        let other = folder.join("other.toml");
+        let input = [&whole[..starts[0]], &species.concat(), &whole[end..]].concat();
+        std::fs::write(&other, input).expect("the build folder can be written");
+        let restart = ["--restart", directory.to_str().expect("a UTF-8 path")];
+        let output = launch(&Run { config: &other, ranks: 2, threads: 1 }, &directory, &restart);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(named), "{named}: {}", text(&output));
+        assert_eq!(listing(&directory), before, "{named}");
+    }
 }
 
 /// Steps of the rows of a history.

@@ -425,7 +425,7 @@ static AUTOMATIC: Table = Table {
 pub static OUTPUT: Table = Table {
     meaning: "What is written, and how often.",
     keys: &[
-        key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory."),
+        key("directory", Kind::Text, Derived("runs/<name of the file>"), "The run directory, for one run at a time."),
         key(
             "history",
             Kind::Interval,

@@ -88,7 +88,7 @@ pub fn write(
     lay_out_particles(&mut layout, global.particles);
     lay_out_contacts(&mut layout, counts[0] as u64, memory.width as u64);
 
-    let path = directory.join(file_name(global.step));
+    let path = path_in(directory, global.step);
     let writer = Writer::create(comm, &path, &layout)?;
     write_particles(&writer, first, &particles)?;
     write_contacts(&writer, first_row, &memory)?;
@@ -103,20 +103,21 @@ pub fn write(
     Ok(path)
 }
 
-/// The newest valid checkpoint of a run directory. A newer one that is damaged is passed over with a
-/// warning. Collective.
+/// The newest valid checkpoint of a run directory before this step (`None`: of all). A newer one that is damaged is passed
+/// over with a warning. Collective.
 ///
 /// # Errors
 /// [`Error::Checkpoint`] on every rank when there is none that can be used.
-pub fn latest(comm: &Communicator, directory: &Path) -> Result<Latest> {
+pub fn latest(comm: &Communicator, directory: &Path, before: Option<u64>) -> Result<Latest> {
     let found = if comm.rank() == 0 { steps(directory) } else { Ok(Vec::new()) };
-    let found = agree(comm, found)?;
+    let mut found = agree(comm, found)?;
+    found.retain(|step| before.is_none_or(|before| *step < before));
     let mut bytes: Vec<u8> = found.iter().flat_map(|step| step.to_le_bytes()).collect();
     comm.broadcast(0, &mut bytes);
     let mut warnings = Vec::new();
     for step in bytes.chunks_exact(8).rev() {
         let step = step.iter().rev().fold(0u64, |value, &byte| value << 8 | u64::from(byte));
-        let path = directory.join(file_name(step));
+        let path = path_in(directory, step);
         match seal::verify(comm, &path) {
             Ok(()) => return Ok(Latest { path, warnings }),
             Err(error) => warnings.push(format!("passed over: {error}")),
@@ -157,7 +158,7 @@ pub fn read(comm: &Communicator, path: &Path) -> Result<Checkpoint> {
 /// As [`latest`] and [`read`].
 pub fn digest_of(path: &Path) -> Result<Digest> {
     let comm = Communicator::single();
-    let file = if path.is_dir() { latest(&comm, path)?.path } else { path.to_path_buf() };
+    let file = if path.is_dir() { latest(&comm, path, None)?.path } else { path.to_path_buf() };
     Ok(read(&comm, &file)?.digest)
 }
 
@@ -168,9 +169,15 @@ pub fn digest_of(path: &Path) -> Result<Digest> {
 /// [`Error::File`] when one cannot be deleted.
 pub fn discard_after(directory: &Path, step: u64) -> Result<()> {
     for later in steps(directory)?.into_iter().filter(|&found| found > step) {
-        remove(&directory.join(file_name(later)))?;
+        remove(&path_in(directory, later))?;
     }
     Ok(())
+}
+
+/// Path of the checkpoint of a step in a run directory.
+#[must_use]
+pub fn path_in(directory: &Path, step: u64) -> PathBuf {
+    directory.join(file_name(step))
 }
 
 fn file_name(step: u64) -> String {
@@ -196,7 +203,7 @@ fn prune(directory: &Path, step: u64, keep: usize) -> Result<()> {
     let older: Vec<u64> = steps(directory)?.into_iter().filter(|&found| found < step).collect();
     let surplus = (older.len() + 1).saturating_sub(keep.max(1));
     for &old in older.iter().take(surplus) {
-        remove(&directory.join(file_name(old)))?;
+        remove(&path_in(directory, old))?;
     }
     remove_unfinished(directory)
 }

@@ -33,7 +33,7 @@ impl FromStr for Digest {
 ///
 /// Sum modulo 2¹²⁸ of the XXH3-128 of each particle's bytes, of each contact's key and memory, and of
 /// the global state as JSON. Left out of the global state is what depends on output settings alone:
-/// the number of history rows and of snapshots.
+/// the number of history rows and of snapshots; and what has passed: the time before and the start of the stage before.
 #[must_use]
 pub fn digest(
     comm: &Communicator,
@@ -68,7 +68,8 @@ pub(crate) fn sum_over_ranks(comm: &Communicator, own: u128) -> u128 {
 }
 
 fn global_hash(global: &GlobalState) -> u128 {
-    let physical = GlobalState { history_rows: 0, snapshots: 0, previous_time: None, ..global.clone() };
+    let physical =
+        GlobalState { history_rows: 0, snapshots: 0, previous_time: None, previous_stage: None, ..global.clone() };
     let json = serde_json::to_string(&physical).expect("a struct of numbers always has a JSON form");
     xxh3_128(json.as_bytes())
 }
@@ -76,7 +77,7 @@ fn global_hash(global: &GlobalState) -> u128 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::state::ContactKey;
+    use crate::state::{ContactKey, StageStart};
     use bytemuck::Zeroable;
 
     /// A state with `count` particles and a contact between each and the next, in a scrambled order.
@@ -101,6 +102,7 @@ pub(crate) mod tests {
             particles: u64::from(count),
             quasi_static: None,
             previous_time: Some(0.3),
+            previous_stage: None,
         };
         let mut particles = Vec::new();
         let mut memory = ContactMemory::new(3);
@@ -155,7 +157,9 @@ pub(crate) mod tests {
         assert_ne!(first, digest(&comm, &global, &particles, &other));
         let other = GlobalState { time: 0.3, ..global.clone() };
         assert_ne!(first, digest(&comm, &other, &particles, &memory));
-        let other = GlobalState { history_rows: 99, snapshots: 98, previous_time: None, ..global };
+        let start = StageStart { time: 0.1, step: 1, strain: [0.0; 3], stress: [0.0; 3] };
+        let (previous_time, previous_stage) = (None, Some(start));
+        let other = GlobalState { history_rows: 99, snapshots: 98, previous_time, previous_stage, ..global };
         assert_eq!(first, digest(&comm, &other, &particles, &memory));
     }
 

@@ -233,8 +233,8 @@ fn first_rows(directory: &Path, rows: u64) -> Result<String> {
     let lines: Vec<&str> = text.split_inclusive('\n').filter(|line| line.ends_with('\n')).take(wanted).collect();
     if lines.len() < wanted {
         let message = format!(
-            "holds {} rows where the checkpoint has written {rows}; restart from an older checkpoint or into a new \
-             output directory",
+            "holds {} rows where the checkpoint has written {rows}; restart from an older checkpoint, or begin anew \
+             without --restart",
             lines.len().saturating_sub(1)
         );
         return Err(Error::File { path, message });

@@ -6,17 +6,17 @@ use crate::config::{self, AxisControl, Config, Interval, Routine};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
 use crate::force::observe::Wanted;
-use crate::output::checkpoint;
 use crate::output::digest::Digest;
-use crate::output::history::{self, HistoryWriter};
+use crate::output::files::write_atomically;
+use crate::output::history::HistoryWriter;
 use crate::output::log::{Log, RunSize, StageTimes, cost_table};
 use crate::output::plot;
 use crate::output::ranks::{effort_table, rank_table};
-use crate::output::snapshot::{self, Moment, SnapshotSeries, Style};
+use crate::output::snapshot::{Moment, SnapshotSeries, Style};
 use crate::simulation::{Report, Simulation, Stage, Timers};
 use crate::state::GlobalState;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -25,118 +25,6 @@ const PROGRESS_STEPS: u64 = 256;
 
 /// Rows of dynamic stages where the history counts increments.
 pub const DYNAMIC_HISTORY: Interval = Interval::Steps(1000);
-
-fn failed(attempt: &str, path: &Path, error: &std::io::Error) -> Error {
-    Error::File {
-        path: path.to_path_buf(),
-        message: format!("cannot {attempt} ({error}); choose another output.directory or free the disk"),
-    }
-}
-
-/// Rank 0 makes the run directory.
-///
-/// # Errors
-/// It cannot be made.
-pub fn make_directory(config: &Config) -> Result<()> {
-    let directory = &config.output.directory;
-    fs::create_dir_all(directory).map_err(|error| failed("make the run directory", directory, &error))
-}
-
-/// Rank 0: the directory holds the rows and snapshots that the state counts.
-///
-/// # Errors
-/// It does not.
-pub fn check_beginning(config: &Config, global: &GlobalState) -> Result<()> {
-    let directory = &config.output.directory;
-    history::check(directory, global.history_rows)?;
-    config.output.snapshots.map_or(Ok(()), |_| snapshot::check(directory, global.snapshots))
-}
-
-/// Rank 0 writes the resolved input, and clears away what belongs to a future that is computed anew from this state: later
-/// checkpoints first, as a restart from them would miss what goes next; the end of an earlier run; and snapshots, where
-/// none are wanted.
-///
-/// # Errors
-/// The directory cannot be written.
-pub fn clear_future(config: &Config, global: &GlobalState) -> Result<()> {
-    let directory = &config.output.directory;
-    let path = directory.join("config.resolved.toml");
-    fs::write(&path, &config.resolved).map_err(|error| failed("write the resolved input", &path, &error))?;
-    checkpoint::discard_after(directory, global.step)?;
-    for path in ends_of_earlier_runs(directory) {
-        fs::remove_file(&path).map_err(|error| failed("remove the old file", &path, &error))?;
-    }
-    if config.output.snapshots.is_some() { Ok(()) } else { snapshot::discard_after(directory, global.snapshots) }
-}
-
-/// Rank 0: a restart goes on in the directory of its checkpoint or begins one in which no run has written.
-///
-/// # Errors
-/// The directory holds another run, whose files would be mixed with those of this one.
-pub fn check_directory(config: &Config, checkpoint: &Path) -> Result<()> {
-    let to = &config.output.directory;
-    let from = folder_of(checkpoint);
-    if is_same(from, to) || !to.join("history.csv").exists() {
-        return Ok(());
-    }
-    Err(Error::Input(format!(
-        "output.directory {} holds another run than the checkpoint {}: go on where that one is with --output {}, or give \
-         the name of a new directory",
-        to.display(),
-        checkpoint.display(),
-        from.display()
-    )))
-}
-
-fn folder_of(checkpoint: &Path) -> &Path {
-    checkpoint.parent().filter(|from| !from.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-fn is_same(one: &Path, other: &Path) -> bool {
-    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
-}
-
-/// Rank 0: a restart that writes into another directory first takes over the history and the snapshots
-/// that lie beside the checkpoint, so that the new directory tells the whole run.
-///
-/// # Errors
-/// There is no history beside the checkpoint, or it cannot be copied.
-pub fn take_over(config: &Config, checkpoint: &Path) -> Result<()> {
-    let to = &config.output.directory;
-    let from = folder_of(checkpoint);
-    if is_same(from, to) || to.join("history.csv").exists() {
-        return Ok(());
-    }
-    let copied = |from: &Path, to: &Path| {
-        fs::copy(from, to).map(|_| ()).map_err(|error| Error::File {
-            path: from.to_path_buf(),
-            message: format!(
-                "cannot copy to {} ({error}); a restart into another directory needs the files beside the checkpoint: \
-                 leave it in its run directory, or give that one with --output",
-                to.display()
-            ),
-        })
-    };
-    if let Ok(entries) = fs::read_dir(from.join("snapshots")) {
-        let folder = to.join("snapshots");
-        fs::create_dir_all(&folder).map_err(|error| failed("make the folder", &folder, &error))?;
-        for entry in entries.flatten().filter(|entry| entry.path().is_file()) {
-            copied(&entry.path(), &folder.join(entry.file_name()))?;
-        }
-    }
-    // Last and at once: what holds a table counts as a run.
-    let part = to.join("history.csv.part");
-    copied(&from.join("history.csv"), &part)?;
-    let table = to.join("history.csv");
-    fs::rename(&part, &table).map_err(|error| failed("write the table", &table, &error))
-}
-
-/// Status file and post-mortem files in a run directory.
-fn ends_of_earlier_runs(directory: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let old = |name: &str| name == "status.toml" || name.starts_with("post_mortem-rank") && name.ends_with(".json");
-    entries.filter(|entry| entry.file_name().to_str().is_some_and(old)).map(|entry| entry.path()).collect()
-}
 
 /// Open output of a run on one rank.
 pub struct RunOutput {
@@ -151,7 +39,8 @@ pub struct RunOutput {
 }
 
 impl RunOutput {
-    /// Open history and snapshots: new, or cut to what the state has counted (restart). Collective.
+    /// Open history and snapshots: new, or cut to what the state has counted (restart); then write the resolved input.
+    /// Collective.
     ///
     /// # Errors
     /// Files cannot be made, or hold less than the checkpoint counts.
@@ -172,6 +61,10 @@ impl RunOutput {
             }
             None => None,
         };
+        // Last, so that after a kill the input is not newer than the table beside it.
+        let resolved = directory.join("config.resolved.toml");
+        let written = if first { write_atomically(&resolved, config.resolved.as_bytes()) } else { Ok(()) };
+        agree(comm, written)?;
         Ok(Self {
             config: Arc::clone(config),
             history,

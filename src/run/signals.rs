@@ -3,12 +3,34 @@
 use crate::error::{Error, Result};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
+use std::mem::MaybeUninit;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Number of SIGUSR1.
 pub const USR1: i32 = SIGUSR1;
+
+/// Hold SIGUSR1 back while the program begins, also in a program that takes the place of this one; see [`let_through`].
+pub fn hold_back() {
+    change_mask(libc::SIG_BLOCK);
+}
+
+/// Let SIGUSR1 through, also one that was held back: to [`Signals::listen`] if that came before, else it ends the program.
+pub fn let_through() {
+    change_mask(libc::SIG_UNBLOCK);
+}
+
+/// Of this thread, while there is no other.
+fn change_mask(how: i32) {
+    let mut set = MaybeUninit::<libc::sigset_t>::uninit();
+    // SAFETY: the set is filled by `sigemptyset` before it is used, and no old mask is asked for.
+    unsafe {
+        libc::sigemptyset(set.as_mut_ptr());
+        libc::sigaddset(set.as_mut_ptr(), SIGUSR1);
+        libc::pthread_sigmask(how, set.as_ptr(), std::ptr::null_mut());
+    }
+}
 
 /// The last signal received, if any.
 #[derive(Debug, Clone)]

@@ -4,13 +4,89 @@ use crate::error::{Error, Result};
 use crate::state::GlobalState;
 use toml::{Table, Value};
 
-/// Keys of a species that say how its particles begin, and the motion that driven ones have had since.
-const OF_SPECIES: [&str; 8] =
-    ["count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin", "motion"];
+/// Keys of a species that say how its particles begin, the material whose laws their contacts' memory belongs to, and the
+/// motion that driven ones have had since.
+const OF_SPECIES: [&str; 9] =
+    ["material", "count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin", "motion"];
 /// The same of the cell, and its faces.
 const OF_CELL: [&str; 4] = ["sides", "aspect", "solid_fraction", "boundary"];
 /// Keys of a stage from which its strain follows, counted from where it began.
 const OF_STAGE: [&str; 3] = ["routine", "strain_rate", "strain_increment"];
+
+/// Keys that end a stage.
+const OF_END: [&str; 5] = ["duration", "until_strain", "until_stress", "steps", "increments"];
+
+/// Changed ends of stages that have acted already.
+pub struct PassedEnds {
+    /// What has changed.
+    pub changes: Vec<String>,
+    /// The run was complete, and only its last stage ends otherwise.
+    pub last_of_complete: bool,
+    /// No stage that is over ends otherwise, but the running one: its end has cut the increment in which it is.
+    pub increment_was_cut: bool,
+}
+
+/// Compare the ends of stages that are over, or in their last increment, with those that the checkpoint's input has, both
+/// resolved.
+///
+/// # Errors
+/// An input cannot be read.
+pub fn passed_ends(before: &str, now: &str, global: &GlobalState) -> Result<PassedEnds> {
+    let (before, now) = (stages(&read(before)?), stages(&read(now)?));
+    let mut changes = Changes(Vec::new());
+    let mut last_of_complete = global.stage == before.len();
+    for (index, ((label, old), (_, new))) in before.iter().zip(&now).enumerate().take(global.stage) {
+        let known = changes.0.len();
+        changes.of_keys(&format!("{label}."), old, new, &OF_END);
+        for key in OF_END.iter().filter(|key| !old.contains_key(**key)) {
+            if let Some(new) = new.get(*key) {
+                changes.note(format!("{label}.{key} is {new} and was not there"));
+            }
+        }
+        last_of_complete &= index + 1 == before.len() || changes.0.len() == known;
+    }
+    let over = changes.0.len();
+    if let (Some((label, old)), 0) =
+        (before.get(global.stage).filter(|(_, old)| is_in_last_increment(old, global)), over)
+    {
+        let new = now.get(global.stage).map_or_else(Table::new, |(_, new)| new.clone());
+        changes.of_keys(&format!("{label}."), old, &new, &["until_strain"]);
+    }
+    Ok(PassedEnds { last_of_complete, increment_was_cut: changes.0.len() > over, changes: changes.0 })
+}
+
+/// The cell has the strain that ends a quasi-static stage, but no equilibrium yet.
+fn is_in_last_increment(stage: &Table, global: &GlobalState) -> bool {
+    let end = |axis: &str| stage.get("until_strain").and_then(|end| end.get(axis)).and_then(Value::as_float);
+    global.quasi_static.is_some_and(|state| state.substep > 0)
+        && ["x", "y", "z"].iter().zip(global.strain).any(|(axis, strain)| end(axis) == Some(strain))
+}
+
+fn read(text: &str) -> Result<Table> {
+    text.parse::<Table>().map_err(|error| Error::Input(format!("the resolved input: {error}")))
+}
+
+/// The tables of a list with their paths.
+fn list(of: &Table, name: &str) -> Vec<(String, Table)> {
+    let tables = of.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_table);
+    tables.enumerate().map(|(index, table)| (format!("{name}.{index}"), table.clone())).collect()
+}
+
+/// The stages as they follow each other, cycles written out.
+fn stages(of: &Table) -> Vec<(String, Table)> {
+    let mut stages = Vec::new();
+    for (path, stage) in list(of, "stage") {
+        let parts = list(&stage, "part");
+        let cycles = stage.get("cycles").and_then(Value::as_integer).unwrap_or(1);
+        if parts.is_empty() {
+            stages.push((path, stage));
+        } else {
+            let one = || parts.iter().map(|(part, table)| (format!("{path}.{part}"), table.clone()));
+            (0..cycles).for_each(|_| stages.extend(one()));
+        }
+    }
+    stages
+}
 
 /// Compare the input of a restart with the one that the checkpoint holds, both resolved. Whether the run has kept an
 /// energy ledger.
@@ -19,13 +95,14 @@ const OF_STAGE: [&str; 3] = ["routine", "strain_rate", "strain_increment"];
 /// The input changes what no longer acts, or not as it says: the particles' beginning, what velocities mean, or the strain
 /// of a stage that has begun.
 pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<bool> {
-    let read = |text: &str| text.parse::<Table>().map_err(|error| Error::Input(format!("the resolved input: {error}")));
     let (before, now) = (read(before)?, read(now)?);
     let mut changes = Changes(Vec::new());
     changes.of_keys("", &before, &now, &["seed", "packing"]);
     changes.of_tables("cell", &before, &now, &OF_CELL);
     changes.of_tables("load", &before, &now, &["kinematics"]);
-    changes.of_lists("species", &before, &now, &OF_SPECIES, usize::MAX);
+    if changes.keeps_names(&before, &now) {
+        changes.of_lists(&list(&before, "species"), &list(&now, "species"), &OF_SPECIES);
+    }
     if !changes.0.is_empty() {
         return Err(changes.refused(
             "a restart takes particles and cell from the checkpoint, so that these keys would do nothing, or not what they \
@@ -34,8 +111,10 @@ pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<bool> {
     }
     // A stage that is just being entered may still change.
     let begun = global.stage + usize::from(global.step != global.stage_start_step);
-    changes.of_lists("stage", &before, &now, &OF_STAGE, begun);
-    changes.of_controls(&before, &now, begun);
+    let (mut old, new) = (stages(&before), stages(&now));
+    old.truncate(begun);
+    changes.of_lists(&old, &new, &OF_STAGE);
+    changes.of_controls(&old, &new);
     if !changes.0.is_empty() {
         return Err(changes.refused(
             "the strain of a stage counts from where it began, so that it cannot strain otherwise on the way: put the \
@@ -50,6 +129,13 @@ pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<bool> {
 struct Changes(Vec<String>);
 
 impl Changes {
+    /// Cycles would say the same again.
+    fn note(&mut self, line: String) {
+        if !self.0.contains(&line) {
+            self.0.push(line);
+        }
+    }
+
     /// Keys of a table that have changed or are gone; what a newer program adds is no change.
     fn of_keys(&mut self, place: &str, before: &Table, now: &Table, keys: &[&str]) {
         for key in keys {
@@ -68,8 +154,8 @@ impl Changes {
                 }
             }
             (_, Some(new)) if old == new => {}
-            (_, Some(new)) => self.0.push(format!("{path} is {new} and was {old}")),
-            (_, None) => self.0.push(format!("{path} is gone and was {old}")),
+            (_, Some(new)) => self.note(format!("{path} is {new} and was {old}")),
+            (_, None) => self.note(format!("{path} is gone and was {old}")),
         }
     }
 
@@ -78,30 +164,39 @@ impl Changes {
         self.of_keys(&format!("{name}."), &table(before), &table(now), keys);
     }
 
-    /// Which axes of the first `count` stages a stress steers; its target and largest rate are free.
-    fn of_controls(&mut self, before: &Table, now: &Table, count: usize) {
-        let steered = |stage: Option<&Value>| -> Vec<String> {
-            let stress = stage.and_then(|stage| stage.get("stress")).and_then(Value::as_table);
+    /// Which species there are, and in which order: particles know theirs by its number.
+    fn keeps_names(&mut self, before: &Table, now: &Table) -> bool {
+        let names = |of: &Table| -> Vec<String> {
+            let name = |(_, species): (String, Table)| species.get("name").map_or_else(String::new, Value::to_string);
+            list(of, "species").into_iter().map(name).collect()
+        };
+        let (old, new) = (names(before), names(now));
+        if old != new {
+            self.note(format!("the species are {} and were {}", new.join(", "), old.join(", ")));
+        }
+        old == new
+    }
+
+    /// Which axes of stages a stress steers; its target and largest rate are free.
+    fn of_controls(&mut self, before: &[(String, Table)], now: &[(String, Table)]) {
+        let steered = |stage: Option<&(String, Table)>| -> Vec<String> {
+            let stress = stage.and_then(|(_, stage)| stage.get("stress")).and_then(Value::as_table);
             stress.into_iter().flat_map(Table::keys).cloned().collect()
         };
-        let stages = |of: &Table| of.get("stage").and_then(Value::as_array).cloned().unwrap_or_default();
-        let (before, now) = (stages(before), stages(now));
-        for (index, old) in before.iter().enumerate().take(count) {
-            let (old, new) = (steered(Some(old)), steered(now.get(index)));
+        for (index, stage) in before.iter().enumerate() {
+            let (old, new) = (steered(Some(stage)), steered(now.get(index)));
             if old != new {
-                self.0.push(format!("stage.{index}.stress steers the axes {new:?} and steered {old:?}"));
+                self.note(format!("{}.stress steers the axes {new:?} and steered {old:?}", stage.0));
             }
         }
     }
 
-    /// The first `count` tables of a list.
-    fn of_lists(&mut self, name: &str, before: &Table, now: &Table, keys: &[&str], count: usize) {
-        let list = |of: &Table| of.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
-        let (before, now) = (list(before), list(now));
-        for (index, old) in before.iter().enumerate().take(count) {
-            let empty = Table::new();
-            let [old, new] = [Some(old), now.get(index)].map(|v| v.and_then(Value::as_table).unwrap_or(&empty));
-            self.of_keys(&format!("{name}.{index}."), old, new, keys);
+    /// Tables of lists.
+    fn of_lists(&mut self, before: &[(String, Table)], now: &[(String, Table)], keys: &[&str]) {
+        let empty = Table::new();
+        for (index, (path, old)) in before.iter().enumerate() {
+            let new = now.get(index).map_or(&empty, |(_, table)| table);
+            self.of_keys(&format!("{path}."), old, new, keys);
         }
     }
 

@@ -146,6 +146,22 @@ pub struct GlobalState {
     /// Time before the last step \[s\]; absent before the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub previous_time: Option<f64>,
+    /// Where the stage before the current one began; absent in the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub previous_stage: Option<StageStart>,
+}
+
+/// Where a stage began.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct StageStart {
+    /// Time \[s\].
+    pub time: f64,
+    /// Step.
+    pub step: u64,
+    /// Strain.
+    pub strain: [f64; 3],
+    /// Measured stress \[Pa\].
+    pub stress: [f64; 3],
 }
 
 /// Where the quasi-static routine is.

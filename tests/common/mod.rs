@@ -108,3 +108,19 @@ pub fn wait_for_file(directory: &Path, wanted: impl Fn(&str) -> bool) {
     }
     panic!("no such file appeared in {}", directory.display());
 }
+
+/// Names and contents of what lies in a run directory, but for checkpoints, of which only the names count.
+pub fn listing(directory: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = std::fs::read_dir(directory).expect("the directory can be read").flatten();
+    let mut files: Vec<_> = entries
+        .filter(|entry| entry.path().is_file())
+        .map(|entry| {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let content =
+                if name.ends_with(".h5") { Vec::new() } else { std::fs::read(entry.path()).unwrap_or_default() };
+            (name, content)
+        })
+        .collect();
+    files.sort();
+    files
+}

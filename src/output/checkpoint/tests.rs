@@ -141,18 +141,18 @@ const MAGIC_LENGTH: usize = "dem-mpi checkpoint ".len();
 fn latest_passes_over_a_damaged_checkpoint_with_a_warning() {
     let folder = tempfile::tempdir().expect("folder");
     let comm = Communicator::single();
-    assert!(message_of(latest(&comm, folder.path())).contains("no checkpoint-STEP.h5"));
+    assert!(message_of(latest(&comm, folder.path(), None)).contains("no checkpoint-STEP.h5"));
     let (old, _) = write_sample(folder.path(), 1, 2);
     let (new, _) = write_sample(folder.path(), 2, 2);
-    assert_eq!(latest(&comm, folder.path()).expect("latest").path, new);
+    assert_eq!(latest(&comm, folder.path(), None).expect("latest").path, new);
     let mut bad = fs::read(&new).expect("read");
     bad.truncate(4000);
     fs::write(&new, bad).expect("write");
-    let found = latest(&comm, folder.path()).expect("latest");
+    let found = latest(&comm, folder.path(), None).expect("latest");
     assert_eq!(found.path, old);
     assert!(found.warnings[0].contains("truncated"), "{:?}", found.warnings);
     fs::write(&old, b"x").expect("write");
-    assert!(message_of(latest(&comm, folder.path())).contains("can be used"));
+    assert!(message_of(latest(&comm, folder.path(), None)).contains("can be used"));
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::output::files::{io_error, write_atomically};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
 pub(super) fn particle_file(number: usize) -> String {
@@ -51,25 +52,32 @@ pub(super) fn write_series(folder: &Path, kind: &str, times: &[f64], name: fn(us
     write_atomically(&folder.join(series_name(kind)), text.as_bytes())
 }
 
-/// That the index lists at least `count` snapshots.
+/// What to do where snapshots are missing.
+const REMEDY: &str = "put the files of that run back, restart from an older checkpoint, or leave out output.snapshots to go on without any";
+
+/// That the index lists at least `count` snapshots, and that these are there.
 ///
 /// # Errors
-/// [`Error::File`] when it is missing, cannot be read or holds fewer.
+/// [`Error::File`] when it cannot be read or holds fewer, or a snapshot is missing.
 pub(super) fn check_length(folder: &Path, count: usize) -> Result<()> {
     if count == 0 {
         return Ok(());
     }
     let path = folder.join(series_name("particles"));
-    let text = fs::read_to_string(&path).map_err(|error| io_error(&path, "read the index of snapshots", &error))?;
-    let index: Value = serde_json::from_str(&text).unwrap_or_default();
+    let index: Value = match fs::read_to_string(&path) {
+        Ok(text) => serde_json::from_str(&text).unwrap_or_default(),
+        Err(error) if error.kind() == ErrorKind::NotFound => Value::Null,
+        Err(error) => return Err(io_error(&path, "read the index of snapshots", &error)),
+    };
     let listed = index["files"].as_array().map_or(0, Vec::len);
     if listed < count {
-        let message = format!(
-            "lists {listed} snapshots where the checkpoint has written {count}; restart into a new output directory"
-        );
+        let message = format!("lists {listed} snapshots where the checkpoint has written {count}; {REMEDY}");
         return Err(Error::File { path, message });
     }
-    Ok(())
+    match (0..count).map(|number| folder.join(particle_file(number))).find(|path| !path.exists()) {
+        Some(path) => Err(Error::File { path, message: format!("is missing, though the index lists it; {REMEDY}") }),
+        None => Ok(()),
+    }
 }
 
 /// Cut the existing indices down to these snapshots.

@@ -1,9 +1,9 @@
-use super::check;
+use super::{check, passed_ends};
 use crate::output::digest::tests::sample;
-use crate::state::GlobalState;
+use crate::state::{GlobalState, QuasiStaticState};
 
 const INPUT: &str = "seed = 1\n[packing.random_close]\ncontraction_rate = 0.001\n[cell]\nsolid_fraction = 0.6\n\
-    [[species]]\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
+    [[species]]\nname = \"a\"\ncount = 60\nvelocity = [0.0, 0.0, 0.0]\n[species.radius]\nfixed = 1e-6\n\
     [[stage]]\nstrain_rate = [0.0, 0.0, 1.0]\nduration = 1.0\n[[stage]]\nstrain_rate = [0.0, 0.0, -1.0]\nsteps = 5\n\
     [stage.stress.x]\ntarget = 5.0\nmax_rate = 1.0\n[load]\nkinematics = \"BC\"\n\
     [output]\nhistory = \"10 steps\"\n";
@@ -32,6 +32,24 @@ fn what_a_run_begins_with_cannot_change() {
         let message = refused(from, to, &state(0, 7)).unwrap();
         assert!(message.contains(named), "{message}");
     }
+}
+
+#[test]
+fn species_keep_their_names_number_and_order() {
+    let before = "[[species]]\nname = \"a\"\n[[species]]\nname = \"b\"\n";
+    for (now, named) in [
+        ("[[species]]\nname = \"b\"\n[[species]]\nname = \"a\"\n", "are \"b\", \"a\" and were \"a\", \"b\""),
+        ("[[species]]\nname = \"a\"\n[[species]]\nname = \"c\"\n", "are \"a\", \"c\" and were \"a\", \"b\""),
+        ("[[species]]\nname = \"a\"\n", "are \"a\" and were \"a\", \"b\""),
+        (&format!("{before}[[species]]\nname = \"c\"\n"), "are \"a\", \"b\", \"c\" and were \"a\", \"b\""),
+    ] {
+        let message = check(before, now, &state(0, 7)).unwrap_err().to_string();
+        assert!(message.contains(named), "{message}");
+    }
+    let [soft, hard] = ["soft", "hard"].map(|name| before.replace("name", &format!("material = \"{name}\"\nname")));
+    assert!(check(&soft, &soft, &state(0, 7)).is_ok());
+    let message = check(&soft, &hard, &state(0, 7)).unwrap_err().to_string();
+    assert!(message.contains("species.1.material is \"hard\" and was \"soft\""), "{message}");
 }
 
 #[test]
@@ -68,4 +86,49 @@ fn ends_of_stages_output_and_keys_of_newer_programs_may_change() {
     ] {
         assert_eq!(refused(from, to, &state(0, 7)), None, "{to}");
     }
+}
+
+const CYCLES: &str = "[[stage]]\ncycles = 2\n[[stage.part]]\nstrain_rate = [1.0, 0.0, 0.0]\nsteps = 5\n\
+    [[stage.part]]\nstrain_rate = [-1.0, 0.0, 0.0]\nsteps = 6\n[[stage]]\nstrain_rate = [0.0, 0.0, 0.0]\nsteps = 7\n";
+
+#[test]
+fn stages_of_cycles_are_counted_as_they_run() {
+    let faster = CYCLES.replace("[-1.0", "[-2.0");
+    assert!(check(CYCLES, &faster, &state(1, 0)).is_ok());
+    let message = check(CYCLES, &faster, &state(3, 2)).unwrap_err().to_string();
+    assert_eq!(message.matches("stage.0.part.1.strain_rate is").count(), 1, "{message}");
+    assert!(check(CYCLES, &CYCLES.replace("[0.0, 0.0, 0.0]", "[3.0, 0.0, 0.0]"), &state(4, 0)).is_ok());
+    assert!(check(CYCLES, &CYCLES.replace("[0.0, 0.0, 0.0]", "[3.0, 0.0, 0.0]"), &state(4, 1)).is_err());
+}
+
+#[test]
+fn changed_ends_of_stages_that_are_over_are_found() {
+    for (from, to, stage, change, last) in [
+        ("steps = 7", "steps = 8", 5, "stage.1.steps is 8 and was 7", true),
+        ("steps = 7", "duration = 8.0", 5, "stage.1.duration is 8.0 and was not there", true),
+        ("steps = 7", "steps = 8", 4, "", false),
+        ("steps = 6", "steps = 8", 5, "stage.0.part.1.steps is 8 and was 6", false),
+        ("steps = 6", "steps = 8", 1, "", false),
+        ("steps = 5", "steps = 8", 1, "stage.0.part.0.steps is 8 and was 5", false),
+    ] {
+        let found = passed_ends(CYCLES, &CYCLES.replace(from, to), &state(stage, 0)).unwrap();
+        assert!(found.changes.is_empty() == change.is_empty(), "{:?}", found.changes);
+        assert!(found.changes.join(", ").contains(change), "{:?}", found.changes);
+        assert_eq!(found.last_of_complete, last, "{to} in {stage}");
+    }
+}
+
+#[test]
+fn an_increment_that_a_changed_end_has_cut_is_found() {
+    let input = "[[stage]]\nstrain_increment = [0.0, 0.0, 2e-4]\n[stage.until_strain]\nz = 0.0041\n";
+    let later = input.replace("0.0041", "0.006");
+    let within = |strain: f64, substep: u64| {
+        let progress =
+            QuasiStaticState { increments: 20, stage_start_increments: 0, substep, mixing: 0.0, downhill: 0 };
+        GlobalState { strain: [0.0, 0.0, strain], quasi_static: Some(progress), ..state(0, 7) }
+    };
+    let cut = passed_ends(input, &later, &within(0.0041, 5)).unwrap();
+    assert!(cut.increment_was_cut && cut.changes.join("").contains("stage.0.until_strain.z is 0.006 and was 0.0041"));
+    assert!(!passed_ends(input, input, &within(0.0041, 5)).unwrap().increment_was_cut);
+    assert!(!passed_ends(input, &later, &within(0.004, 5)).unwrap().increment_was_cut);
 }
