@@ -6,6 +6,7 @@ mod build;
 mod contact;
 mod diagnostic;
 mod document;
+pub mod idle;
 pub mod keys;
 mod particles;
 mod programme;
