@@ -89,7 +89,11 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     let pairs = contact::read(root, &context);
     let load = stages::read_load(root);
     let common = routine::of_load(root);
-    let stages = stages::read(root, cell.as_ref(), common);
+    let unstressed = match (gravity, &species, &packing) {
+        (Some(gravity), Some(species), Some(packing)) => stages::begins_unstressed(gravity, species, packing),
+        _ => false,
+    };
+    let stages = stages::read(root, &stages::Beginning { cell: cell.as_ref(), unstressed }, common);
     let quasi_static = routine::read(root);
     let time_step = settings::read_time_step(root);
     let output = settings::read_output(root, &stem);

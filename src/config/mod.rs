@@ -9,7 +9,7 @@ mod document;
 pub mod idle;
 pub mod keys;
 mod particles;
-mod programme;
+pub mod programme;
 mod radius;
 mod reference;
 mod resolved;
