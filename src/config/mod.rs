@@ -26,6 +26,7 @@ mod velocities;
 pub use build::load;
 pub use reference::{example, reference_markdown};
 pub use routine::{Damping, QuasiStaticConfig, Routine};
+pub use settings::MOST_DIAMETERS;
 pub use shape::ShapeConfig;
 pub use velocities::Velocities;
 
