@@ -7,6 +7,7 @@ use crate::exchange::{Communicator, agree};
 use crate::output::{checkpoint, plot};
 use crate::run::{self, Outcome, RunOptions, Signals};
 use crate::scaling::{self, ScalingOptions};
+use crate::setup;
 use crate::verify;
 use crate::verify::becker2021::Becker2021Options;
 use crate::verify::wahn2022::Wahn2022Options;
@@ -116,7 +117,10 @@ pub fn main() -> i32 {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are no errors; clap prints each to the right stream.
-            return delivered(error.print()).map_or_else(|fault| report(&fault), |()| error.exit_code());
+            return parallel(|comm| match comm.rank() {
+                0 => delivered(error.print()).map(|()| error.exit_code()),
+                _ => Ok(error.exit_code()),
+            });
         }
     };
     let Some(command) = arguments.command else {
@@ -126,32 +130,49 @@ pub fn main() -> i32 {
         return parallel(|comm| run_command(comm, &arguments.run, signals));
     };
     run::let_through();
-    let done = match command {
-        Command::Check { config, input } => {
-            input.load(&config).and_then(|config| print(&config::sheet::sheet(&config)))
-        }
-        Command::Init => print(&config::example()),
-        Command::Reference => print(&config::reference_markdown()),
-        Command::Plot { directory } => plot::plot_run(&directory).map(|files| {
-            for file in files {
+    match command {
+        Command::Check { config, input } => on_first(|ranks| check(&config, &input, ranks)),
+        Command::Init => on_first(|_| print(&config::example())),
+        Command::Reference => on_first(|_| print(&config::reference_markdown())),
+        Command::Plot { directory } => on_first(|_| {
+            for file in plot::plot_run(&directory)? {
                 say!("{}", file.display());
             }
+            Ok(())
         }),
-        Command::Bench(options) => return parallel(|comm| bench::main(comm, &options).map(|()| 0)),
-        Command::Scaling(options) => scaling::table(&options).and_then(|table| print(&table)),
-        Command::Verify { paper: Some(Paper::Wahn2022(options)), .. } => {
-            return verify::wahn2022::main(&options).unwrap_or_else(|error| report(&error));
-        }
-        Command::Verify { paper: Some(Paper::Becker2021(options)), .. } => {
-            return verify::becker2021::main(&options).unwrap_or_else(|error| report(&error));
-        }
-        Command::Verify { filter, paper: None } => return verify::main(filter.as_deref()),
-        Command::Digest { path } => checkpoint::digest_of(&path).and_then(|digest| print(&digest.to_string())),
-    };
-    match done {
-        Ok(()) => 0,
-        Err(error) => report(&error),
+        Command::Bench(options) => parallel(|comm| bench::main(comm, &options).map(|()| 0)),
+        Command::Scaling(options) => on_first(|_| scaling::table(&options).and_then(|table| print(&table))),
+        Command::Verify { filter, paper } => alone("verify", || match &paper {
+            Some(Paper::Wahn2022(options)) => verify::wahn2022::main(options),
+            Some(Paper::Becker2021(options)) => verify::becker2021::main(options),
+            None => Ok(verify::main(filter.as_deref())),
+        }),
+        Command::Digest { path } => on_first(|_| print(&checkpoint::digest_of(&path)?.to_string())),
     }
+}
+
+/// Print the sheet of an input, and refuse what its run on so many ranks would refuse before the first step.
+fn check(path: &Path, input: &InputArguments, ranks: usize) -> Result<()> {
+    let config = Arc::new(input.load(path)?);
+    let tried = setup::trial(&config, ranks);
+    let completed = tried.as_ref().ok().and_then(Option::as_ref);
+    print(&config::sheet::sheet(completed.unwrap_or(&config)))?;
+    tried.map(|_| ())
+}
+
+/// What rank 0 does alone, given the number of ranks, while the others wait: commands that have no use for more.
+fn on_first(work: impl FnOnce(usize) -> Result<()>) -> i32 {
+    parallel(|comm| if comm.rank() == 0 { work(comm.size()).map(|()| 0) } else { Ok(0) })
+}
+
+/// A command that takes its time and would let all ranks but one idle.
+fn alone(name: &str, work: impl FnOnce() -> Result<i32>) -> i32 {
+    parallel(|comm| match comm.size() {
+        1 => work(),
+        ranks => Err(Error::Input(format!(
+            "`dem-mpi {name}` runs in one process, and mpirun started {ranks}; run it without mpirun"
+        ))),
+    })
 }
 
 /// Print what a command is there to print; if that fails, so does the command.

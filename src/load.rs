@@ -130,6 +130,17 @@ impl LoadProgramme {
         if fastest > 0.0 { MAX_STRAIN_PER_STEP / fastest } else { f64::INFINITY }
     }
 
+    /// Whether the stage waits in vain for a larger stress: the cell only expands, and has become longer by half without
+    /// anything that touches, or by its own length.
+    #[must_use]
+    pub fn waits_in_vain(&self, global: &GlobalState, contacts: u64) -> bool {
+        let Some(stage) = self.stage(global).filter(|stage| stage.only_expands_towards_stress()) else { return false };
+        let upwards = stage.until_stress.is_some_and(|(axis, target)| target > global.stage_start_stress[axis]);
+        let longer = |k: usize| global.stage_start_strain[k] - global.strain[k];
+        let longest = [0, 1, 2].map(longer).into_iter().fold(0.0, f64::max);
+        upwards && !passed_stress(stage, global) && (longest > 1.0 || longest > 0.5 && contacts == 0)
+    }
+
     /// What the next step does.
     #[must_use]
     pub fn plan(&self, global: &GlobalState, wanted_time_step: f64) -> StepPlan {

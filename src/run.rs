@@ -16,7 +16,7 @@ use crate::output::digest::{self, Digest};
 use crate::setup::{self, Ends, Initial};
 use crate::simulation::{Requests, Simulation, Stage};
 use efforts::Efforts;
-pub use efforts::{peak_bytes, resident_bytes};
+pub use efforts::{available_bytes, peak_bytes, ranks_here, resident_bytes};
 use output::{DYNAMIC_HISTORY, RunOutput, is_due};
 pub use signals::{Signals, hold_back, let_through};
 use std::path::{Path, PathBuf};
@@ -113,11 +113,7 @@ pub fn set_up_threads(comm: &Communicator, config: &Config) -> usize {
 
 fn automatic_threads(ranks: usize) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let local = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"]
-        .iter()
-        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok())
-        .unwrap_or(ranks);
-    (cores / local.max(1)).max(1)
+    (cores / ranks_here(ranks)).max(1)
 }
 
 /// What a restart begins with.

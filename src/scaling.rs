@@ -6,14 +6,17 @@ use crate::exchange::model::{HaloGeometry, Machine, StepTime};
 use crate::exchange::{Decomposition, HaloContent};
 use clap::Args;
 
+/// Ranks of the table, if none are given.
+const RANKS: [usize; 4] = [1, 1000, 10_000, 100_000];
+
 /// Options of `dem-mpi scaling`.
 #[derive(Debug, Clone, Args)]
 pub struct ScalingOptions {
     /// Particles over all ranks.
     #[arg(long, default_value_t = 1e9)]
     particles: f64,
-    /// Numbers of ranks.
-    #[arg(long, value_delimiter = ',', default_values_t = [1, 1000, 10_000, 100_000])]
+    /// Numbers of ranks [default: 1,1000,10000,100000, up to the number of particles]
+    #[arg(long, value_delimiter = ',')]
     ranks: Vec<usize>,
     /// Time of one rank alone per particle and step [s]: one over the particle-steps/s of `dem-mpi bench`.
     #[arg(long, default_value_t = 1e-7)]
@@ -38,31 +41,35 @@ pub struct ScalingOptions {
 /// The prediction, a line per number of ranks.
 ///
 /// # Errors
-/// [`Error::Input`] if a number is not positive.
+/// [`Error::Input`] if a number is out of its range, or there are more ranks than particles.
 pub fn table(options: &ScalingOptions) -> Result<String> {
     let ScalingOptions { particles, step_cost, contact_share, latency, bandwidth, skin, solid_fraction, .. } = *options;
-    let positive = [
-        ("--particles", particles),
-        ("--step-cost", step_cost),
-        ("--contact-share", contact_share),
-        ("--latency", latency),
-        ("--bandwidth", bandwidth),
-        ("--solid-fraction", solid_fraction),
-        ("--ranks", options.ranks.iter().min().map_or(0.0, |&ranks| ranks as f64)),
+    let numbers = [
+        ("--particles", particles, [1.0, 1e15]),
+        ("--step-cost", step_cost, [1e-15, 1.0]),
+        ("--contact-share", contact_share, [1e-3, 1.0]),
+        ("--latency", latency, [1e-15, 1.0]),
+        ("--bandwidth", bandwidth, [1.0, 1e18]),
+        ("--skin", skin, [0.0, 10.0]),
+        ("--solid-fraction", solid_fraction, [1e-3, 1.0]),
     ];
-    for (name, value) in positive {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(Error::Input(format!("{name} {value}: give a number greater than 0")));
+    for (name, value, [least, most]) in numbers {
+        if !(least..=most).contains(&value) {
+            let found = if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+                value.to_string()
+            } else {
+                format!("{value:e}")
+            };
+            return Err(Error::Input(format!("{name} {found}: give a number from {least:e} to {most:e}")));
         }
     }
-    for (name, value) in [("--contact-share", contact_share), ("--solid-fraction", solid_fraction)] {
-        if value > 1.0 {
-            return Err(Error::Input(format!("{name} {value}: give a number of at most 1")));
-        }
+    if let Some(ranks) = options.ranks.iter().find(|&&ranks| ranks == 0 || ranks as f64 > particles) {
+        return Err(Error::Input(format!(
+            "--ranks {ranks}: give numbers from 1 to that of the particles, {particles}, or more --particles"
+        )));
     }
-    if !(skin >= 0.0 && skin.is_finite()) {
-        return Err(Error::Input(format!("--skin {skin}: give 0 or a positive number")));
-    }
+    let usual = RANKS.iter().copied().filter(|&ranks| ranks as f64 <= particles);
+    let all_ranks: Vec<usize> = if options.ranks.is_empty() { usual.collect() } else { options.ranks.clone() };
     let machine = Machine { step_cost, contact_share, latency, bandwidth };
     // Lengths in radii.
     let side = libm::cbrt(particles * 4.0 / 3.0 * std::f64::consts::PI / solid_fraction);
@@ -81,7 +88,7 @@ pub fn table(options: &ScalingOptions) -> Result<String> {
         "eff. %",
         "hidden %"
     )];
-    for &ranks in &options.ranks {
+    for ranks in all_ranks {
         let grid = Decomposition::automatic(ranks, particles as u64, 1, [side; 3]).grid;
         let geometry =
             HaloGeometry { grid, sides: [side; 3], periodic: [true; 3], margin: 2.0 + 2.0 * skin, particles };

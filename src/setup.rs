@@ -2,6 +2,9 @@
 
 mod begun;
 mod overlap;
+mod trial;
+
+pub use trial::trial;
 
 use crate::config::{
     Boundary, Config, Kinematics, Motion, PackingConfig, ParallelConfig, Replication, Routine, TimeStepConfig,
@@ -78,6 +81,13 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         particles = packing::replicate::share(config, &base, own_block(comm, count));
         sides = config.replication.whole(sides);
     }
+    let global = beginning(config, sides, count);
+    begin_ledgers(config, &global, &mut particles);
+    Ok(Initial { global, particles, memory: ContactMemory::new(0), columns: Vec::new() })
+}
+
+/// The global state at time 0, the first stage entered.
+fn beginning(config: &Config, sides: [f64; 3], count: u64) -> GlobalState {
     let mut global = GlobalState {
         step: 0,
         time: 0.0,
@@ -101,8 +111,7 @@ pub fn from_packing(comm: &Communicator, config: &Config) -> Result<Initial> {
         previous_stage: None,
     };
     programme(config).enter(&mut global);
-    begin_ledgers(config, &global, &mut particles);
-    Ok(Initial { global, particles, memory: ContactMemory::new(0), columns: Vec::new() })
+    global
 }
 
 /// Where velocities are absolute, ledgers begin with the energy of the cell's motion.

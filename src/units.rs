@@ -32,6 +32,12 @@ pub fn parse(text: &str, expected: Dimension) -> Result<f64, String> {
     Ok(finite(&shifted, text)? * unit.factor / unit.divisor)
 }
 
+/// Whether the unit of a quantity counts cycles: `Hz`, with or without prefix. Angular velocities count radians.
+#[must_use]
+pub fn counts_cycles(text: &str) -> bool {
+    split_number(text.trim()).is_ok_and(|(_, unit)| unit.split(|c: char| !c.is_alphabetic()).any(|s| s.ends_with("Hz")))
+}
+
 /// The leading decimal number and the rest without blanks around it.
 fn split_number(text: &str) -> Result<(&str, &str), String> {
     let bytes = text.as_bytes();
@@ -108,6 +114,12 @@ mod tests {
         for (text, dimension, value) in cases {
             assert_eq!(parse(text, dimension), Ok(value), "{text}");
         }
+    }
+
+    #[test]
+    fn hertz_counts_cycles() {
+        assert!(["2 Hz", "1 kHz", "3 rad Hz"].into_iter().all(counts_cycles));
+        assert!(!["2 1/s", "3 rad/s", "60 rpm", "5", "word"].into_iter().any(counts_cycles));
     }
 
     #[test]

@@ -53,6 +53,9 @@ fn a_fault_on_the_command_line_is_shown_as_one() {
         ("stage.0.cycles=9223372036854775807", "at most 100000 stages in all"),
         ("time_step.automatic.safety=0.6", "the number 0.6 is out of range"),
         ("title=[]", "error: title: found a list of 0"),
+        ("output.checkpoints_kept=18446744073709551615", "at most 9223372036854775807"),
+        ("parallel.min_particles_per_rank=1e19", "is too large\n"),
+        ("packing.file.path=.", "is a folder"),
     ];
     for (argument, fragment) in cases {
         let message = load(&file, &[argument.to_owned()], None, None).unwrap_err().to_string();
@@ -60,6 +63,25 @@ fn a_fault_on_the_command_line_is_shown_as_one() {
     }
     let message = load(&file, &[], None, Some(0)).unwrap_err().to_string();
     assert!(message.contains("command line, --threads"), "{message}");
+}
+
+#[test]
+fn a_number_that_cannot_be_read_is_one_problem() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/quickstart.toml");
+    let argument = "output.checkpoints_kept=18446744073709551615".to_owned();
+    let message = load(&file, &[argument], None, None).unwrap_err().to_string();
+    assert!(message.contains(": 1 problem found"), "{message}");
+}
+
+#[test]
+fn folders_and_files_that_are_no_text_are_named_as_such() {
+    let folder = tempfile::tempdir().expect("folder");
+    let message = load(folder.path(), &[], None, None).unwrap_err().to_string();
+    assert!(message.contains("is a folder") && !message.contains("dem-mpi init"), "{message}");
+    let file = folder.path().join("bytes.toml");
+    std::fs::write(&file, b"title = \"a\"\n# \xff\n").expect("file");
+    let message = load(&file, &[], None, None).unwrap_err().to_string();
+    assert!(message.contains("line 2 is not UTF-8 text"), "{message}");
 }
 
 #[test]

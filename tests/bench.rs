@@ -60,7 +60,9 @@ fn numbers_without_meaning_are_refused() {
         assert_eq!(output.status.code(), Some(2), "{}", text(&output));
         assert!(text(&output).contains(&format!("'{value}' for '{name}")), "{}", text(&output));
     }
-    for (name, value) in [("--contact-share", "2"), ("--solid-fraction", "1.1"), ("--latency", "0")] {
+    for (name, value) in
+        [("--contact-share", "2"), ("--solid-fraction", "1.1"), ("--latency", "0"), ("--step-cost", "1e300")]
+    {
         let mut command = command(1);
         command.args(["scaling", name, value]).stdout(Stdio::piped()).stderr(Stdio::piped());
         let output = common::wait(command.spawn().expect("the program starts"));
@@ -111,7 +113,14 @@ fn scaling_studies_leave_a_table_and_pictures() {
 #[test]
 fn wrong_usage_is_refused_with_one_message() {
     let folder = scratch("usage");
-    let cases: [(usize, &[&str], &str); 7] = [
+    packing(&folder);
+    let cases: [(usize, &[&str], &str); 13] = [
+        (1, &["--threads", "2"], "were not provided"),
+        (1, &["--packing", "p.data", "--output", "out"], "cannot be used with"),
+        (1, &["--write-data", "q.data", "--particles", "10", "--output", "out"], "cannot be used with"),
+        (2, &["--packing", "p.data", "--copies", "100000x100000x100000"], "more than ids can number"),
+        (2, &["--packing", "p.data", "--copies", "200x200x300"], "GB are free; give fewer copies"),
+        (1, &["--packing", "p.data", "--sides", "1", "nan", "1"], "three lengths above 0"),
         (2, &["--particles", "300"], "run it without mpirun"),
         (2, &["--packing", "absent.data"], "correct the path"),
         (1, &["--write-data", "p.data"], "needs one --particles N"),
@@ -126,7 +135,26 @@ fn wrong_usage_is_refused_with_one_message() {
     ];
     for (ranks, arguments, expected) in cases {
         let output = bench(ranks, &folder, arguments);
-        assert!(!output.status.success(), "{arguments:?}");
+        assert!(!output.status.success(), "{arguments:?}: {}", text(&output));
         assert_eq!(text(&output).matches(expected).count(), 1, "{arguments:?}: {}", text(&output));
     }
+}
+
+#[test]
+fn more_ranks_than_particles_are_refused_and_none_are_assumed() {
+    let scaling = |arguments: &[&str]| {
+        let mut command = command(1);
+        command.arg("scaling").args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+        common::wait(command.spawn().expect("the program starts"))
+    };
+    let refused = scaling(&["--particles", "10", "--ranks", "1,11"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
+    assert!(
+        text(&refused).contains("--ranks 11: give numbers from 1 to that of the particles, 10"),
+        "{}",
+        text(&refused)
+    );
+    let table = scaling(&["--particles", "2000"]);
+    assert!(table.status.success() && String::from_utf8_lossy(&table.stdout).lines().count() == 4, "{}", text(&table));
+    assert!(text(&scaling(&["--help"])).contains("[default: 1,1000,10000,100000"));
 }

@@ -42,13 +42,15 @@ fn corrupt_truncated_and_foreign_checkpoints_are_refused() {
     for (bytes, what) in [
         (flipped, "damaged"),
         (good[..good.len() / 2].to_vec(), "truncated"),
-        (b"not a checkpoint".to_vec(), "foreign"),
+        ([&good[..], b"more"].concat(), "too long"),
+        (b"not a checkpoint".to_vec(), "not a dem-mpi checkpoint"),
     ] {
         fs::write(&file, bytes).expect("the build folder can be written");
         for ranks in [1, 2] {
             let output = restart(&file, ranks);
             assert_eq!(output.status.code(), Some(1), "{what} on {ranks} ranks: {}", text(&output));
             assert!(text(&output).contains("spoilt.h5"), "{what}: {}", text(&output));
+            assert!(text(&output).contains(what), "{what}: {}", text(&output));
         }
     }
 }
@@ -131,14 +133,22 @@ fn a_full_disk_ends_the_run_with_one_message_and_keeps_the_last_checkpoint() {
 #[test]
 fn an_overlap_beyond_the_limit_stops_all_ranks_with_a_post_mortem() {
     let config = data("mixed_flow.toml");
-    for ranks in [1, 3] {
+    let mut contacts = Vec::new();
+    for ranks in [1, 2, 3, 4] {
         let directory = scratch("overlap");
-        let extra = ["--set", "contact.max_overlap_fraction=0.001"];
+        // The jump of an increment makes many contacts overlap too much at once.
+        let stage = "stage=[{routine=\"quasi_static\", strain_increment=0.009, increments=2}]";
+        let limit = "contact.max_overlap_fraction=0.001";
+        let extra = ["--set", limit, "--set", stage, "--set", "output.energy_ledger=false"];
         let output = launch(&Run { config: &config, ranks, threads: 1 }, &directory, &extra);
         expect_failure(&output, 1, &["overlaps by", "max_overlap_fraction", "step"]);
         let names = fs::read_dir(&directory).into_iter().flatten().flatten();
         assert!(names.filter_map(|e| e.file_name().into_string().ok()).any(|n| n.starts_with("post_mortem")));
+        let said = text(&output);
+        let named = said.split_once("the contact of ").and_then(|(_, rest)| rest.split_once(", more than"));
+        contacts.push(named.map_or_else(|| panic!("no contact in {said}"), |(contact, _)| contact.to_owned()));
     }
+    assert!(contacts.iter().all(|contact| *contact == contacts[0]), "not the same on any ranks: {contacts:?}");
 }
 
 #[test]
@@ -179,4 +189,23 @@ fn energies_that_are_no_numbers_are_an_error() {
         let output = launch(&Run { config: &config, ranks, threads: 1 }, &scratch("huge"), &extra);
         expect_failure(&output, 1, &["kinetic energy is NaN", "units of radii"]);
     }
+}
+
+#[test]
+fn waiting_for_a_stress_while_the_cell_only_expands_comes_to_an_end() {
+    let config = data("mixed_flow.toml");
+    let extra =
+        ["--set", "stage=[{strain_rate={z=-200}, until_stress={z=1e6}}]", "--set", "output.energy_ledger=false"];
+    let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &scratch("vain"), &extra);
+    expect_failure(&output, 1, &["waits for the stress of until_stress while the cell only expands", "another end"]);
+}
+
+#[test]
+fn constants_that_no_law_reads_are_warned_of_once() {
+    let config = data("mixed_flow.toml");
+    let extra = ["--set", "material.0.yield_stress=1e6"];
+    let output = launch(&Run { config: &config, ranks: 2, threads: 1 }, &scratch("idle"), &extra);
+    assert!(output.status.success(), "{}", text(&output));
+    let warning = "yield_stress of the material \"hard\" has no effect";
+    assert_eq!(text(&output).matches(warning).count(), 1, "{}", text(&output));
 }

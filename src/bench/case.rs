@@ -3,11 +3,11 @@
 use super::data::{cells, moved};
 use super::workload::{Law, Leg, Particles, Workload};
 use super::{BenchOptions, parse_copies};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::exchange::{Communicator, agree};
 use crate::force::observe::Wanted;
-use crate::packing::file;
-use crate::run::{peak_bytes, resident_bytes, set_up_threads};
+use crate::packing::{MAX_PARTICLES, file};
+use crate::run::{available_bytes, peak_bytes, ranks_here, resident_bytes, set_up_threads};
 use crate::setup::{self, Initial};
 use crate::simulation::{Requests, STAGES, Simulation, Stage};
 use crate::state::ParticleState;
@@ -30,10 +30,14 @@ pub fn run(comm: &Communicator, path: &Path, options: &BenchOptions) -> Result<(
     let parse = |legs: Vec<(Leg, u64)>| {
         let sides = options.sides.as_deref().and_then(|sides| <[f64; 3]>::try_from(sides).ok());
         let particles = Particles::File { path, species: &names, sides };
-        agree(comm, Workload { particles, law: options.law, legs, threads: usize::from(options.threads) }.config())
+        agree(
+            comm,
+            Workload { particles, law: options.law, legs, threads: options.threads.map_or(1, usize::from) }.config(),
+        )
     };
     let mut initial = setup::from_packing(comm, &parse(vec![(Leg::AlongZ(STRAIN_RATE), 1)])?)?;
     if copies != [1; 3] {
+        agree(comm, check_room(comm, initial.global.particles, copies))?;
         replicate(comm, &mut initial, copies);
     }
     let total = initial.global.particles;
@@ -126,6 +130,31 @@ fn names_of_all(comm: &Communicator, names: Vec<String>) -> Vec<String> {
     let mut bytes = names.join("\n").into_bytes();
     comm.broadcast(0, &mut bytes);
     String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect()
+}
+
+/// Memory of a particle while its rank is set up \[bytes\] (docs/performance.md).
+const BYTES_PER_PARTICLE: u64 = 1000;
+
+/// That ids can number the copies and that this rank's share of them fits into the memory there is.
+fn check_room(comm: &Communicator, base: u64, copies: [usize; 3]) -> Result<()> {
+    let total = copies.iter().fold(base, |product, &n| product.saturating_mul(n as u64));
+    let text = copies.map(|n| n.to_string()).join("x");
+    if total > MAX_PARTICLES as u64 {
+        return Err(Error::Input(format!(
+            "--copies {text} of {base} particles are more than ids can number ({MAX_PARTICLES}); give fewer copies"
+        )));
+    }
+    let share = total.div_ceil(comm.size() as u64).saturating_mul(BYTES_PER_PARTICLE);
+    let needed = share.saturating_mul(ranks_here(comm.size()) as u64);
+    match available_bytes() {
+        Some(available) if needed > available => Err(Error::Input(format!(
+            "--copies {text} of {base} particles need about {:.1} GB on this machine, where {:.1} GB are free; give fewer \
+             copies, or use more machines",
+            1e-9 * needed as f64,
+            1e-9 * available as f64
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Repeat the packing along each axis; every rank makes its share of the copies.

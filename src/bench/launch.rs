@@ -36,8 +36,8 @@ impl FromStr for Layout {
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         match text.split_once('x').map(|(ranks, threads)| (ranks.parse(), threads.parse())) {
-            Some((Ok(ranks @ 1..), Ok(threads @ 1..=1024))) => Ok(Self { ranks, threads }),
-            _ => Err("give RANKSxTHREADS, for example 2x1".into()),
+            Some((Ok(ranks @ 1..=1_000_000), Ok(threads @ 1..=1024))) => Ok(Self { ranks, threads }),
+            _ => Err("give RANKSxTHREADS, for example 2x1; at most 1000000 ranks of 1024 threads".into()),
         }
     }
 }

@@ -13,6 +13,7 @@ mod workload;
 
 use crate::error::{Error, Result};
 use crate::exchange::Communicator;
+use crate::packing::MAX_PARTICLES;
 use clap::Args;
 use launch::{Layout, Measurement, Series};
 use make::Plan;
@@ -26,19 +27,19 @@ pub struct BenchOptions {
     #[arg(long, value_delimiter = ',')]
     particles: Vec<usize>,
     /// Layouts as RANKSxTHREADS.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', conflicts_with = "write_data")]
     layouts: Vec<Layout>,
     /// Repeats of each combination.
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..), conflicts_with_all = ["packing", "write_data"])]
     repeats: u32,
     /// Steps to time; by itself some seconds' worth.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..), conflicts_with = "write_data")]
     steps: Option<u64>,
     /// Steps before the timed ones.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "write_data")]
     warm: Option<u64>,
     /// Normal law.
-    #[arg(long, value_enum, default_value_t = Law::Hertz)]
+    #[arg(long, value_enum, default_value_t = Law::Hertz, conflicts_with = "write_data")]
     law: Law,
     /// Largest over smallest radius of packings made here.
     #[arg(long, value_name = "RATIO", default_value_t = 1.0)]
@@ -55,9 +56,9 @@ pub struct BenchOptions {
     /// Sides of the cell in m, for packings that do not hold them.
     #[arg(long, value_names = ["X", "Y", "Z"], num_args = 3, requires = "packing")]
     sides: Option<Vec<f64>>,
-    /// Threads per rank with --packing.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: u16,
+    /// Threads per rank with --packing [default: 1]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024), requires = "packing")]
+    threads: Option<u16>,
     /// Make a packing of --particles particles and write it, spheres as a LAMMPS data file, ellipsoids as CSV; times
     /// nothing.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["strong", "weak"])]
@@ -69,11 +70,11 @@ pub struct BenchOptions {
     #[arg(long)]
     weak: bool,
     /// Folder for tables, pictures and the packings made [default: bench-strong, bench-weak, or none]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["packing", "write_data"])]
     output: Option<PathBuf>,
     /// Command before the program, with {ranks} and {threads}, split at blanks [default: mpirun, ranks bound to cores
     /// where there are enough].
-    #[arg(long, value_name = "COMMAND")]
+    #[arg(long, value_name = "COMMAND", conflicts_with_all = ["packing", "write_data"])]
     launcher: Option<String>,
 }
 
@@ -82,6 +83,11 @@ pub struct BenchOptions {
 /// # Errors
 /// A packing cannot be made, read or written, or a case cannot be started or fails.
 pub fn main(comm: &Communicator, options: &BenchOptions) -> Result<()> {
+    if let Some(sides) = options.sides.as_ref().filter(|sides| sides.iter().any(|s| !(s.is_finite() && *s > 0.0))) {
+        return Err(Error::Input(format!(
+            "--sides {sides:?}: give three lengths above 0 in m, for example 1e-4 1e-4 1e-4"
+        )));
+    }
     if let Some(path) = &options.packing {
         return case::run(comm, path, options);
     }
@@ -93,8 +99,10 @@ pub fn main(comm: &Communicator, options: &BenchOptions) -> Result<()> {
         ));
     }
     make::checked_ratio(options.radii)?;
-    if options.particles.contains(&0) {
-        return Err(Error::Input("--particles 0: give numbers above 0, for example 10000".into()));
+    if let Some(wrong) = options.particles.iter().find(|&&number| number == 0 || number > MAX_PARTICLES) {
+        return Err(Error::Input(format!(
+            "--particles {wrong}: give numbers from 1 to {MAX_PARTICLES}, for example 10000"
+        )));
     }
     if let Some(path) = &options.write_data {
         let &[particles] = &options.particles[..] else {
@@ -172,6 +180,7 @@ fn base_packing(folder: &Path, plan: Plan, options: &BenchOptions) -> Result<Bas
     Ok(BasePacking { path, sides: None })
 }
 
+/// Copies along each axis, as given.
 fn parse_copies(text: Option<&str>) -> Result<[usize; 3]> {
     let Some(text) = text else { return Ok([1; 3]) };
     let numbers: Vec<usize> = text.split('x').filter_map(|part| part.parse().ok().filter(|n| *n > 0)).collect();

@@ -14,11 +14,19 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, or with every problem found in it.
 pub fn load(path: &Path, overrides: &[String], output: Option<&Path>, threads: Option<usize>) -> Result<Config> {
-    let text = std::fs::read_to_string(path).map_err(|error| {
+    let refused = |message: String| Error::Input(format!("{}: {message}", path.display()));
+    if path.is_dir() {
+        return Err(refused("is a folder, not an input file; name the .toml file in it".to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|error| {
         // Without an ending it may have been meant for a command.
         let commands = if path.extension().is_none() { "; `dem-mpi --help` lists the commands" } else { "" };
         let remedy = format!("check the path, or make one with `dem-mpi init`{commands}");
-        Error::Input(format!("{}: the input cannot be read ({error}); {remedy}", path.display()))
+        refused(format!("the input cannot be read ({error}); {remedy}"))
+    })?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let line = error.as_bytes()[..error.utf8_error().valid_up_to()].split(|byte| *byte == b'\n').count();
+        refused(format!("line {line} is not UTF-8 text; save the file with that encoding, or name the input file"))
     })?;
     Config::parse(&text, path, overrides, output, threads)
 }
@@ -44,6 +52,10 @@ impl Config {
         }
         for argument in overrides {
             document::set(&mut root, &mut sources, argument, &mut problems);
+        }
+        // What cannot be read has no value to check.
+        if !problems.is_empty() {
+            return Err(Error::Input(render(&sources, problems)));
         }
         if let Some(directory) = output {
             let value = document::Value::Text(directory.to_string_lossy().into_owned());
@@ -89,7 +101,11 @@ fn read(root: &Section, file: &Path) -> Option<Config> {
     let pairs = contact::read(root, &context);
     let load = stages::read_load(root);
     let common = routine::of_load(root);
-    let stages = stages::read(root, cell.as_ref(), common);
+    let unstressed = match (gravity, &species, &packing) {
+        (Some(gravity), Some(species), Some(packing)) => stages::begins_unstressed(gravity, species, packing),
+        _ => false,
+    };
+    let stages = stages::read(root, &stages::Beginning { cell: cell.as_ref(), unstressed }, common);
     let quasi_static = routine::read(root);
     let time_step = settings::read_time_step(root);
     let output = settings::read_output(root, &stem);

@@ -120,7 +120,7 @@ fn read_overrides<'a>(root: &Section<'a>, names: &[String]) -> Vec<Override<'a>>
 }
 
 /// Whether contacts between two materials can occur: both have particles, or one is a wall's.
-fn meets(a: usize, b: usize, species: &[Species], cell: &CellConfig) -> bool {
+pub(super) fn meets(a: usize, b: usize, species: &[Species], cell: &CellConfig) -> bool {
     let moving = |m: usize| species.iter().any(|s| s.material == m);
     let wall = |m: usize| cell.boundary.contains(&Boundary::Walls { material: m });
     (moving(a) && (moving(b) || wall(b))) || (moving(b) && wall(a))

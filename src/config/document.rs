@@ -97,7 +97,9 @@ impl Builder<'_> {
             DeValue::String(text) => Value::Text(text.to_string()),
             DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
                 Ok(number) => Value::Integer(number),
-                Err(_) => self.refuse(&place, "an integer beyond 64 bits", "use a smaller number"),
+                Err(_) => {
+                    self.refuse(&place, "an integer beyond 64 bits", "use a number of at most 9223372036854775807")
+                }
             },
             DeValue::Float(number) => match number.as_str().parse::<f64>() {
                 Ok(number) => Value::Float(number),

@@ -205,7 +205,7 @@ static RELAXATION: Table = Table {
 };
 
 static RANDOM_CLOSE: Table = Table {
-    meaning: "Jodrey-Tory random close packing of spheres in a periodic cell; ends with spheres just touching.",
+    meaning: "Jodrey-Tory random close packing of spheres, periodic or between walls; ends with spheres just touching.",
     keys: &[
         key(
             "contraction_rate",

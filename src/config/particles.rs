@@ -176,7 +176,17 @@ fn share(
             last.problem("fraction", format!("the fractions of all species sum to {sum}"), "make them sum to 1");
             return None;
         }
-        largest_remainders(total?, &fractions)
+        let (total, mut enough) = (total?, true);
+        let counts = largest_remainders(total, &fractions);
+        for ((section, fraction), _) in sections.iter().zip(&fractions).zip(&counts).filter(|(_, count)| **count == 0) {
+            let message = format!("the fraction {fraction} of {total} particles is not one particle");
+            section.problem("fraction", message, "give more `particles` or a larger fraction, or remove the species");
+            enough = false;
+        }
+        if !enough {
+            return None;
+        }
+        counts
     } else {
         counts.iter().copied().collect::<Option<Vec<u64>>>()?
     };
@@ -228,7 +238,7 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
     let start = if driven {
         Some(([0.0; 3], 0.0, [0.0; 3]))
     } else {
-        let read = (section.axes("velocity"), section.number("velocity_deviation"), section.axes("spin"));
+        let read = (section.axes("velocity"), section.number("velocity_deviation"), section.angular_axes("spin"));
         read.0.zip(read.1).zip(read.2).map(|((velocity, deviation), spin)| (velocity, deviation, spin))
     };
     let ((radius, shape), (velocity, velocity_deviation, spin)) = (size?, start?);
@@ -248,7 +258,7 @@ fn read_one(section: &Section, materials: &[String]) -> Option<Species> {
 fn read_motion(chosen: Chosen) -> Option<Motion> {
     match chosen {
         Chosen::Table("driven", section) => {
-            let (velocity, spin) = (section.axes("velocity"), section.axes("spin"));
+            let (velocity, spin) = (section.axes("velocity"), section.angular_axes("spin"));
             Some(Motion::Driven { velocity: velocity?, spin: spin? })
         }
         Chosen::Table("fixed", _) => Some(Motion::Driven { velocity: [0.0; 3], spin: [0.0; 3] }),
@@ -299,10 +309,15 @@ fn read_radius(chosen: Chosen) -> Option<RadiusDistribution> {
 
 /// The cut must leave the middle of the distribution in.
 fn ordered(section: &Section, min: f64, max: f64, middle: f64) -> Option<(f64, f64)> {
+    let key = if section.given("min") { "min" } else { "max" };
+    if let Some(radius) = [min, max].into_iter().find(|radius| !(radius * radius * radius).is_normal()) {
+        let message = format!("a sphere of radius {radius:e} m has no volume that a number can hold");
+        section.problem(key, message, "give `min` and `max`, or lower the width of the distribution");
+        return None;
+    }
     if min < max && min <= middle && middle <= max {
         return Some((min, max));
     }
-    let key = if section.given("min") { "min" } else { "max" };
     section.problem(
         key,
         format!("min {min:e} m and max {max:e} m do not enclose {middle:e} m"),

@@ -55,6 +55,11 @@ pub(super) fn read_packing(
         Chosen::Table("file", section) => {
             let replication = read_replication(&section, cell);
             let path = folder.join(section.text("path")?);
+            if path.is_dir() {
+                let message = format!("{} is a folder", path.display());
+                section.problem("path", message, "name the particle file in it");
+                return None;
+            }
             if !path.is_file() {
                 let message = format!("there is no file {}", path.display());
                 section.problem("path", message, "the path is relative to the folder of this input");
@@ -111,6 +116,9 @@ const DENSEST: f64 = 0.7405;
 /// The densest packing known of ellipsoids (Donev et al. 2004, doi:10.1103/PhysRevLett.92.255506).
 const DENSEST_OF_ELLIPSOIDS: f64 = 0.7708;
 
+/// Longest side of a cell over the smallest diameter: beyond, positions do not resolve the overlaps of contacts any more.
+pub const MOST_DIAMETERS: f64 = 1e9;
+
 /// Solid fraction assumed where a random packing finds its own.
 pub(super) const RANDOM_CLOSE: f64 = 0.635;
 
@@ -139,6 +147,16 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
     if let PackingConfig::DropAndRoll(_) = packing {
         check_floor(&section, cell);
     }
+    let smallest = 2.0 * species.iter().map(Species::smallest_semi_axis).fold(f64::INFINITY, f64::min);
+    let longest = cell.sides.map_or(0.0, |sides| sides.into_iter().fold(0.0, f64::max));
+    if longest > MOST_DIAMETERS * smallest {
+        let message =
+            format!("the longest side, {longest:e} m, is {:.1e} times the smallest diameter", longest / smallest);
+        let remedy =
+            format!("at most {MOST_DIAMETERS:e} times, or positions cannot tell what touches; look at the units");
+        section.problem("sides", message, remedy);
+        return;
+    }
     let volume: f64 = species.iter().map(|s| s.count as f64 * s.radius.mean_volume()).sum();
     let (key, fraction) = match (cell.sides, cell.solid_fraction) {
         (Some(sides), _) => ("sides", volume / (sides[0] * sides[1] * sides[2])),
@@ -162,7 +180,18 @@ pub(super) fn check_cell(root: &Section, cell: &CellConfig, packing: &PackingCon
         ("aspect", "use more particles, proportions nearer to 1, or a lower `solid_fraction`")
     };
     let sides = cell.sides.unwrap_or_else(|| cell.sides_at(volume / fraction));
-    for (side, axis) in sides.into_iter().zip(["x", "y", "z"]).filter(|(side, _)| *side < largest) {
+    let mut thin = sides.into_iter().zip(["x", "y", "z"]).filter(|(side, _)| *side < largest);
+    if cell.sides.is_none() && !section.given("aspect") {
+        if let Some((side, _)) = thin.next() {
+            let message =
+                format!("the cell has sides of about {side:.3e} m, the largest particle {largest:e} m across");
+            let remedy =
+                "use more particles, a narrower distribution of sizes or shapes, or a lower cell.solid_fraction";
+            root.problem("species", message, remedy);
+        }
+        return;
+    }
+    for (side, axis) in thin {
         let side = if cell.sides.is_some() { format!("{side:e}") } else { format!("about {side:.3e}") };
         let message = format!("side {axis} is {side} m, the largest particle {largest:e} m across");
         section.problem(key, message, remedy);

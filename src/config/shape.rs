@@ -43,15 +43,25 @@ impl Species {
     /// The largest semi-axis that a particle of the species can have \[m\].
     #[must_use]
     pub fn largest_semi_axis(&self) -> f64 {
+        self.extremes(self.radius.max()).fold(0.0, f64::max)
+    }
+
+    /// The smallest semi-axis that a particle of the species can have \[m\].
+    #[must_use]
+    pub fn smallest_semi_axis(&self) -> f64 {
+        self.extremes(self.radius.min()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The semi-axes of particles with this radius whose ratios are at their bounds: each is monotonic in each ratio.
+    fn extremes(&self, radius: f64) -> impl Iterator<Item = f64> {
         let all = match self.shape {
-            ShapeConfig::Sphere => vec![[self.radius.max(); 3]],
+            ShapeConfig::Sphere => vec![[radius; 3]],
             ShapeConfig::SemiAxes(semi_axes) => vec![semi_axes],
-            // Each semi-axis is monotonic in each ratio: the largest one belongs to bounds.
             ShapeConfig::AspectRatios { b_to_a, c_to_a } => {
-                b_to_a.into_iter().flat_map(|b| c_to_a.map(|c| with_ratios(self.radius.max(), b, c))).collect()
+                b_to_a.into_iter().flat_map(|b| c_to_a.map(|c| with_ratios(radius, b, c))).collect()
             }
         };
-        all.into_iter().flatten().fold(0.0, f64::max)
+        all.into_iter().flatten()
     }
 
     /// Whether its particles are spheres.

@@ -1,6 +1,7 @@
 //! The pre-run sheet: what a run will be like, from the input alone. All numbers are estimates for
 //! the reader's judgement; no simulation reads them.
 
+mod particles;
 mod quasi_static;
 
 use super::programme::{Progress, advance};
@@ -8,11 +9,10 @@ use super::settings::RANDOM_CLOSE;
 use super::{
     AxisControl, Config, MAX_STRAIN_PER_STEP, Material, PackingConfig, PairConfig, Routine, Species, TimeStepConfig,
 };
+use particles::Found;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Memory of a particle with its contacts and lists \[bytes\], as measured on dense packings.
-const BYTES_PER_PARTICLE: f64 = 450.0;
 /// Contacts per particle times two in a dense packing.
 const COORDINATION: f64 = 6.0;
 /// Solid fraction of equal spheres after drop and roll.
@@ -21,11 +21,12 @@ const DROP_AND_ROLL: f64 = 0.58;
 const INERTIA_LIMIT: f64 = 1e4;
 
 /// The sheet as an aligned table with warnings below it.
+/// With particles from a file it says more of an input that knows what the file holds (`setup::trial`).
 #[must_use]
 pub fn sheet(config: &Config) -> String {
     let estimate = Estimate::new(config);
     let mut table = Table::default();
-    particles(&mut table, config, &estimate);
+    particles::rows(&mut table, config, &estimate);
     times(&mut table, config, &estimate);
     regime(&mut table, config, &estimate);
     quasi_static::rows(&mut table, config, &estimate);
@@ -53,31 +54,32 @@ impl Table {
 
 /// What several rows need.
 struct Estimate {
-    count: f64,
-    solid_volume: f64,
+    /// What the particles are, as far as input and file tell.
+    found: Option<Found>,
     solid_fraction: Option<f64>,
-    /// Largest overlap expected over radius, and where it comes from.
-    overlap: f64,
-    overlap_cause: &'static str,
+    /// Largest overlap that the motion of cell and copies brings, over radius, and where it comes from.
+    geometric: (f64, &'static str),
+    /// Largest stress of the programme \[Pa\].
+    stress: f64,
+    /// Largest initial velocity \[m/s\].
+    initial: f64,
     /// Largest strain rate of the programme \[1/s\].
     rate: f64,
     progress: Progress,
     /// Impact velocity expected \[m/s\].
     velocity: f64,
-    inertial_pressure: f64,
 }
 
 impl Estimate {
     fn new(config: &Config) -> Self {
-        let copies = config.replication.number() as f64;
-        let count: f64 = copies * config.species.iter().map(|s| s.count as f64).sum::<f64>();
-        let volumes = config.species.iter().map(|s| s.count as f64 * s.radius.mean_volume());
-        let solid_volume: f64 = copies * volumes.sum::<f64>();
-        let solid_fraction = match (config.cell.sides, &config.packing) {
-            (_, PackingConfig::File { .. }) => None,
-            (Some(sides), _) => Some(solid_volume / (copies * sides[0] * sides[1] * sides[2])),
-            (None, PackingConfig::DropAndRoll(_)) => Some(DROP_AND_ROLL),
-            (None, _) => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
+        let found = Found::counted(config);
+        let solid_fraction = match (&found, config.cell.sides, &config.packing) {
+            (_, None, PackingConfig::DropAndRoll(_)) => Some(DROP_AND_ROLL),
+            (Some(Found { solid_volume, sides: Some(sides), .. }), ..) => {
+                Some(solid_volume / (sides[0] * sides[1] * sides[2]))
+            }
+            (None, ..) => None,
+            _ => Some(config.cell.solid_fraction.unwrap_or(RANDOM_CLOSE)),
         };
         let mut progress = Progress::default();
         let (mut strain, mut rate, mut stress) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -98,38 +100,32 @@ impl Estimate {
         }
         let largest = config.species.iter().map(Species::largest_semi_axis).fold(0.0, f64::max);
         let initial = config.species.iter().map(|s| norm(s.velocity) + 3.0 * s.velocity_deviation).fold(0.0, f64::max);
-        let velocity = initial.max(rate * 2.0 * largest);
-        let fraction = solid_fraction.unwrap_or(RANDOM_CLOSE);
         // Radius over radius: strain ε brings centres 2R apart closer by 2εR.
-        let mut overlap = (2.0 * strain, "strain");
+        let mut geometric = (2.0 * strain, "strain");
         // Two touching spheres that both move towards each other.
-        if 2.0 * config.replication.perturbation > overlap.0 {
-            overlap = (2.0 * config.replication.perturbation, "perturbation");
+        if 2.0 * config.replication.perturbation > geometric.0 {
+            geometric = (2.0 * config.replication.perturbation, "perturbation");
         }
-        for meeting in Meeting::all(config) {
-            let under_stress =
-                meeting.overlap_under(force_of_pressure(stress, fraction, meeting.radius)) / meeting.radius;
-            let of_impact = meeting.overlap_of_impact(2.0 * initial) / meeting.radius;
-            for candidate in [(under_stress, "stress"), (of_impact, "initial velocity")] {
-                if candidate.0 > overlap.0 {
-                    overlap = candidate;
-                }
-            }
-        }
-        let inertial_pressure = Meeting::all(config)
-            .map(|meeting| pressure_of_force(meeting.force(overlap.0 * meeting.radius), fraction, meeting.radius))
-            .fold(0.0, f64::max);
-        Self {
-            count,
-            solid_volume,
-            solid_fraction,
-            overlap: overlap.0,
-            overlap_cause: overlap.1,
-            rate,
-            progress,
-            velocity,
-            inertial_pressure,
-        }
+        let velocity = initial.max(rate * 2.0 * largest);
+        Self { found, solid_fraction, geometric, stress, initial, rate, progress, velocity }
+    }
+
+    fn fraction(&self) -> f64 {
+        self.solid_fraction.unwrap_or(RANDOM_CLOSE)
+    }
+
+    /// Overlap over radius expected of two species: what stress and impacts bring depends on their stiffness.
+    fn overlap_of(&self, meeting: &Meeting) -> (f64, &'static str) {
+        let force = force_of_pressure(self.stress, self.fraction(), meeting.radius);
+        let under_stress = (meeting.overlap_under(force) / meeting.radius, "stress");
+        let of_impact = (meeting.overlap_of_impact(2.0 * self.initial) / meeting.radius, "initial velocity");
+        [under_stress, of_impact].into_iter().fold(self.geometric, |most, one| if one.0 > most.0 { one } else { most })
+    }
+
+    /// The largest of all species.
+    fn largest_overlap(&self, config: &Config) -> (f64, &'static str) {
+        let all = Meeting::all(config).map(|meeting| self.overlap_of(&meeting));
+        all.fold(self.geometric, |most, one| if one.0 > most.0 { one } else { most })
     }
 }
 
@@ -213,14 +209,25 @@ impl<'a> Meeting<'a> {
     }
 }
 
-/// `√(m_min/K_max)` at this overlap over radius \[s\], and the pair that sets K.
-fn contact_time(config: &Config, overlap: f64) -> Option<(f64, String)> {
+/// A time that contacts set, and the contact that sets it.
+struct Limit {
+    time: f64,
+    pair: String,
+    /// Overlap over radius of that contact.
+    overlap: f64,
+}
+
+/// `√(m_min/K_max)` at these overlaps over radius \[s\], with the pair that sets K.
+fn contact_time(config: &Config, overlap: impl Fn(&Meeting) -> f64) -> Option<Limit> {
     let mass =
         config.species.iter().map(|s| smallest_mass(s, &config.materials[s.material])).fold(f64::INFINITY, f64::min);
-    let stiffest = Meeting::all(config)
-        .map(|meeting| (meeting.stiffness(overlap * meeting.radius), meeting.pair.properties.names.join("-")))
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (stiffest.0 > 0.0).then(|| ((mass / stiffest.0).sqrt(), stiffest.1))
+    let stiffnesses = Meeting::all(config).map(|meeting| {
+        let overlap = overlap(&meeting);
+        (meeting.stiffness(overlap * meeting.radius), overlap, meeting)
+    });
+    let (stiffness, overlap, meeting) = stiffnesses.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let pair = meeting.pair.properties.names.join("-");
+    (stiffness > 0.0).then(|| Limit { time: (mass / stiffness).sqrt(), pair, overlap })
 }
 
 /// Whether any particles are ellipsoids.
@@ -228,68 +235,10 @@ fn ellipsoids(config: &Config) -> bool {
     !config.species.iter().all(Species::is_spherical)
 }
 
-/// The automatic time step at this overlap over radius \[s\], and the pair that limits it.
-fn automatic_step(config: &Config, safety: f64, overlap: f64) -> Option<(f64, String)> {
+/// The automatic time step at these overlaps over radius \[s\], and the pair that limits it.
+fn automatic_step(config: &Config, safety: f64, overlap: impl Fn(&Meeting) -> f64) -> Option<Limit> {
     let safety = safety.min(config.damped_safety(ellipsoids(config)));
-    contact_time(config, overlap).map(|(time, pair)| (safety * time, pair))
-}
-
-fn particles(table: &mut Table, config: &Config, estimate: &Estimate) {
-    if let PackingConfig::File { path } = &config.packing {
-        table.row("particles", format!("from {}{}", path.display(), copies_of(config, "")));
-    } else {
-        let base = format!(" of {}", config.species.iter().map(|s| s.count).sum::<usize>());
-        table.row("particles", format!("{}{}", estimate.count, copies_of(config, &base)));
-        let mass = |scaled: bool| -> f64 {
-            let of = |s: &Species| {
-                let material = &config.materials[s.material];
-                let density = material.density * if scaled { material.density_scaling } else { 1.0 };
-                s.count as f64 * s.radius.mean_volume() * density
-            };
-            config.replication.number() as f64 * config.species.iter().map(of).sum::<f64>()
-        };
-        table.row("mass", format!("{} (in motion: {})", quantity(mass(false), "kg"), quantity(mass(true), "kg")));
-        table.row(
-            "contacts expected",
-            format!("{:.0} (coordination {COORDINATION})", estimate.count * COORDINATION / 2.0),
-        );
-        let bytes = estimate.count * BYTES_PER_PARTICLE;
-        table.row("memory", format!("{:.1} MB ({BYTES_PER_PARTICLE} bytes per particle)", bytes / 1e6));
-    }
-    for species in &config.species {
-        let [mean, min, max] = [species.radius.mean(), species.radius.min(), species.radius.max()];
-        let text = if min < max {
-            format!("{} on average, {} to {}", quantity(mean, "m"), quantity(min, "m"), quantity(max, "m"))
-        } else {
-            quantity(mean, "m")
-        };
-        table.row(format!("radius of {}", species.name), text);
-        if !species.is_spherical() {
-            table.row(
-                format!("semi-axes of {}", species.name),
-                format!("up to {}", quantity(species.largest_semi_axis(), "m")),
-            );
-        }
-    }
-    let base_sides = config.cell.sides.or_else(|| {
-        let volume = estimate.solid_volume / config.replication.number() as f64 / estimate.solid_fraction?;
-        Some(config.cell.sides_at(volume))
-    });
-    if let Some(sides) = base_sides.map(|sides| config.replication.whole(sides)) {
-        let text = sides.map(|side| quantity(side, "m")).join(" × ");
-        table.row("cell", if config.cell.sides.is_some() { text } else { format!("about {text}") });
-    }
-    if let Some(fraction) = estimate.solid_fraction {
-        table.row("solid fraction", format!("{fraction:.3}"));
-    }
-}
-
-/// `, 8 copies of 1000`, or nothing.
-fn copies_of(config: &Config, base: &str) -> String {
-    match config.replication.number() {
-        1 => String::new(),
-        copies => format!(" ({copies} copies{base})"),
-    }
+    contact_time(config, overlap).map(|limit| Limit { time: safety * limit.time, ..limit })
 }
 
 fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
@@ -297,10 +246,13 @@ fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
         TimeStepConfig::Automatic { safety, reference_overlap } => (safety, reference_overlap),
         TimeStepConfig::Fixed(_) => (0.17, 1e-3),
     };
-    let steps_at = [("reference", reference), ("expected", estimate.overlap)]
-        .map(|(name, overlap)| automatic_step(config, safety, overlap).map(|(step, pair)| (name, overlap, step, pair)));
-    for (name, overlap, step, pair) in steps_at.iter().flatten() {
-        let text = format!("{}, limited by K of {pair} at overlap/radius {overlap:.1e}", quantity(*step, "s"));
+    let steps_at = [
+        ("reference", automatic_step(config, safety, |_| reference)),
+        ("expected", automatic_step(config, safety, |meeting| estimate.overlap_of(meeting).0)),
+    ];
+    for (name, limit) in &steps_at {
+        let Some(Limit { time, pair, overlap }) = limit else { continue };
+        let text = format!("{}, limited by K of {pair} at overlap/radius {overlap:.1e}", quantity(*time, "s"));
         table.row(format!("automatic Δt at {name} overlap"), text);
     }
     if let TimeStepConfig::Fixed(step) = config.time_step {
@@ -327,7 +279,9 @@ fn times(table: &mut Table, config: &Config, estimate: &Estimate) {
     let count = |step: f64| estimate.progress.steps + if time > 0.0 { time / step.min(most) } else { 0.0 };
     let steps: Vec<f64> = match config.time_step {
         TimeStepConfig::Fixed(step) => vec![count(step)],
-        TimeStepConfig::Automatic { .. } => steps_at.iter().flatten().map(|(_, _, step, _)| count(*step)).collect(),
+        TimeStepConfig::Automatic { .. } => {
+            steps_at.iter().filter_map(|(_, limit)| Some(count(limit.as_ref()?.time))).collect()
+        }
     };
     let length = if estimate.progress.countable { "" } else { "at least " };
     let counts: Vec<String> = steps.iter().map(|count| format!("{count:.2e}")).collect();
@@ -359,7 +313,8 @@ fn hertz_time(config: &Config, velocity: f64) -> Option<f64> {
 }
 
 fn regime(table: &mut Table, config: &Config, estimate: &Estimate) {
-    table.row("overlap/radius expected", format!("{:.2e} (from {})", estimate.overlap, estimate.overlap_cause));
+    let (overlap, cause) = estimate.largest_overlap(config);
+    table.row("overlap/radius expected", format!("{overlap:.2e} (from {cause})"));
     if let Some(number) = inertial_number(config, estimate) {
         table.row("inertial number", format!("{number:.1e} (quasi-static near jamming: below about 2e-5)"));
     }
@@ -388,12 +343,16 @@ fn inertial_number(config: &Config, estimate: &Estimate) -> Option<f64> {
         2.0 * s.radius.mean() * (material.density * material.density_scaling).sqrt()
     };
     let size = config.species.iter().map(heaviest).fold(0.0, f64::max);
-    (estimate.inertial_pressure > 0.0 && estimate.rate > 0.0)
-        .then(|| estimate.rate * size / estimate.inertial_pressure.sqrt())
+    let pressure_of = |meeting: Meeting| {
+        let overlap = estimate.overlap_of(&meeting).0 * meeting.radius;
+        pressure_of_force(meeting.force(overlap), estimate.fraction(), meeting.radius)
+    };
+    let pressure = Meeting::all(config).map(pressure_of).fold(0.0, f64::max);
+    (pressure > 0.0 && estimate.rate > 0.0).then(|| estimate.rate * size / pressure.sqrt())
 }
 
 fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
-    let mut warnings = Vec::new();
+    let mut warnings = super::idle::warnings(config);
     let inertia = inertia(config, estimate);
     if inertia > 1.01 * INERTIA_LIMIT {
         warnings.push(format!(
@@ -401,21 +360,22 @@ fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
              packings near jamming (1.25 to 1.5 times at 1e6): lower density_scaling or the strain rate"
         ));
     }
-    if estimate.overlap > config.max_overlap_fraction {
+    let overlap = estimate.largest_overlap(config).0;
+    if overlap > config.max_overlap_fraction {
         warnings.push(format!(
-            "the overlap expected, {:.2} of the radius, exceeds contact.max_overlap_fraction = {}: the run would stop",
-            estimate.overlap, config.max_overlap_fraction
+            "the overlap expected, {overlap:.2} of the radius, exceeds contact.max_overlap_fraction = {}: the run would stop",
+            config.max_overlap_fraction
         ));
     }
-    if let (TimeStepConfig::Fixed(step), Some((automatic, _))) =
-        (config.time_step, automatic_step(config, 0.17, estimate.overlap.max(1e-3)))
-        && step > automatic
+    if let (TimeStepConfig::Fixed(step), Some(automatic)) =
+        (config.time_step, automatic_step(config, 0.17, |meeting| estimate.overlap_of(meeting).0.max(1e-3)))
+        && step > automatic.time
     {
-        let limit = contact_time(config, 1e-3).map_or(f64::INFINITY, |(time, _)| 2.0 * time);
+        let limit = contact_time(config, |_| 1e-3).map_or(f64::INFINITY, |limit| 2.0 * limit.time);
         warnings.push(format!(
             "the fixed time step {} is larger than the automatic one, {}{}",
             quantity(step, "s"),
-            quantity(automatic, "s"),
+            quantity(automatic.time, "s"),
             if step > limit { "; it is unstable, and the run will refuse it" } else { "" }
         ));
     }
@@ -441,46 +401,4 @@ fn quantity(value: f64, unit: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    fn config(file: &str, overrides: &[&str]) -> Config {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(file);
-        let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-        super::super::load(&path, &overrides, None, None).unwrap_or_else(|error| panic!("{error}"))
-    }
-
-    #[test]
-    fn the_time_step_of_two_spheres_at_two_percent_is_that_of_the_tangent_stiffness() {
-        let config = config("two_spheres.toml", &[]);
-        let estimate = Estimate::new(&config);
-        assert!((estimate.overlap - 0.04).abs() < 1e-12);
-        let (step, _) = automatic_step(&config, 0.17, estimate.overlap).unwrap();
-        assert!((step - 1.3e-4).abs() < 0.05e-4, "{step}");
-    }
-
-    #[test]
-    fn inertia_and_an_overlap_out_of_bounds_are_warned_of() {
-        let calm = sheet(&config("quickstart.toml", &[]));
-        assert!(!calm.contains("warning"), "{calm}");
-        let fast = sheet(&config("quickstart.toml", &["stage.0.strain_rate={z=0.2}", "time_step=\"1 s\""]));
-        for part in
-            ["lower density_scaling", "contact.max_overlap_fraction", "larger than the automatic one", "unstable"]
-        {
-            assert!(fast.contains(part), "{fast}");
-        }
-    }
-
-    #[test]
-    fn steps_are_counted_as_far_as_they_are_known() {
-        let steps = |overrides: &[&str]| {
-            let sheet = sheet(&config("two_spheres.toml", overrides));
-            let line = sheet.lines().find(|line| line.trim_start().starts_with("steps ")).unwrap().to_owned();
-            line.split_whitespace().skip(1).collect::<Vec<_>>().join(" ")
-        };
-        assert_eq!(steps(&["stage=[{hold=true, steps=3000}, {hold=true, steps=500}]"]), "3.50e3");
-        // 0.001 strain in steps of at most 1e-5.
-        assert_eq!(steps(&["stage=[{strain_rate={z=1e6}, until_strain={z=0.001}}]"]), "1.00e2 to 1.00e2");
-    }
-}
+mod tests;

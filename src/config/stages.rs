@@ -3,7 +3,7 @@
 use super::programme::{Progress, advance};
 use super::routine::{self, Routine};
 use super::section::Section;
-use super::{AxisControl, Boundary, CellConfig, Kinematics, Stage};
+use super::{AxisControl, Boundary, CellConfig, Kinematics, Motion, PackingConfig, Replication, Species, Stage};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -15,10 +15,33 @@ pub(super) fn read_load(root: &Section) -> Option<(Kinematics, u64)> {
     Some((kinematics?, interval?))
 }
 
+/// What stages need to know of the rest of the input.
+pub(super) struct Beginning<'a> {
+    /// The cell, if it is right.
+    pub cell: Option<&'a CellConfig>,
+    /// At first nothing moves and particles just touch.
+    pub unstressed: bool,
+}
+
+/// Whether the run begins without stress: particles at rest in a packing that ends with them just touching.
+pub(super) fn begins_unstressed(
+    gravity: [f64; 3],
+    species: &[Species],
+    (packing, replication): &(PackingConfig, Replication),
+) -> bool {
+    let touching = matches!(packing, PackingConfig::RandomClose { .. } | PackingConfig::DropAndRoll(_));
+    let at_rest = |one: &Species| match one.motion {
+        Motion::Free => one.velocity == [0.0; 3] && one.velocity_deviation == 0.0 && one.spin == [0.0; 3],
+        Motion::Driven { velocity, spin } => velocity == [0.0; 3] && spin == [0.0; 3],
+    };
+    touching && replication.perturbation == 0.0 && gravity == [0.0; 3] && species.iter().all(at_rest)
+}
+
 /// Read `[[stage]]`, cycles written out.
-pub(super) fn read(root: &Section, cell: Option<&CellConfig>, routine: Routine) -> Option<Vec<Stage>> {
+pub(super) fn read(root: &Section, beginning: &Beginning, routine: Routine) -> Option<Vec<Stage>> {
+    let cell = beginning.cell;
     let mut stages: Vec<Option<Stage>> = Vec::new();
-    let mut progress = Progress::default();
+    let mut progress = Progress { unstressed: beginning.unstressed, ..Progress::default() };
     for (index, section) in root.list("stage").iter().enumerate() {
         let name = section.text_or("name", &format!("stage {}", index + 1)).unwrap_or_default();
         let cycles = section.integer("cycles");
@@ -210,7 +233,7 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
         let start = progress.strain[axis];
         // What lies behind would end the stage before its first step, whatever else may end it.
         let behind = rate != 0.0 && start.is_some_and(|start| (target - start) * rate <= 0.0);
-        if behind || rate == 0.0 && only_strain {
+        if behind || rate == 0.0 {
             let start = start.map_or_else(String::new, |start| format!(" from strain {start}"));
             let (what, sign, end) = match stage.routine {
                 Routine::Dynamic => (format!("at strain rate {rate} 1/s"), "strain rate's", "duration"),
@@ -218,11 +241,21 @@ fn push(section: &Section, stages: &mut Vec<Option<Stage>>, progress: &mut Progr
             };
             let message = format!("never reached{start} {what} of the {} axis", AXES[axis]);
             let other = if only_strain { format!("end by {end}") } else { "remove it".to_owned() };
-            section.problem("until_strain", message, format!("change the value, the {sign} sign, or {other}"));
+            let mend =
+                if rate == 0.0 { "strain the axis".to_owned() } else { format!("change the value, the {sign} sign") };
+            section.problem("until_strain", message, format!("{mend}, or {other}"));
             progress.lose_track();
             stages.push(None);
             return;
         }
+    }
+    if progress.unstressed && stage.only_expands_towards_stress() {
+        let rates = if stage.routine == Routine::Dynamic { "strain rate" } else { "strain increment" };
+        let message = "never reached: nothing is stressed so far, and the cell only expands".to_owned();
+        section.problem("until_stress", message, format!("give a positive {rates} (compression), or another end"));
+        progress.lose_track();
+        stages.push(None);
+        return;
     }
     advance(progress, &stage);
     for axis in 0..3 {

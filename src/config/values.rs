@@ -6,6 +6,9 @@ use super::document::{Node, Value};
 use super::schema::{Default, Key, Kind};
 use super::section::Section;
 
+/// Up to here every whole number is a float of its own.
+const LARGEST_WHOLE: f64 = 9e15;
+
 impl<'a> Section<'a> {
     /// One number in SI units; `name` may be `key.x` for messages.
     pub(super) fn quantity(&self, node: &Node, name: &str, kind: &Kind) -> Option<f64> {
@@ -124,6 +127,26 @@ impl<'a> Section<'a> {
         Some(values)
     }
 
+    /// As [`Self::axes`], for angular velocities: a unit that counts cycles is refused.
+    pub fn angular_axes(&self, name: &str) -> Option<[f64; 3]> {
+        let nodes = match self.node(name).map(|node| &node.value) {
+            Some(Value::List(items)) => items.iter().collect(),
+            Some(Value::Table(entries)) => entries.iter().map(|entry| &entry.node).collect(),
+            _ => Vec::new(),
+        };
+        let mut faulty = false;
+        for node in nodes {
+            let Value::Text(text) = &node.value else { continue };
+            if crate::units::counts_cycles(text) {
+                let message = format!("\"{text}\": Hz counts revolutions, and an angular velocity counts radians");
+                let remedy = "write rad/s or 1/s (one revolution is 2π rad), or rpm for revolutions per minute";
+                self.report(node.place.clone(), name, message, remedy.to_owned());
+                faulty = true;
+            }
+        }
+        self.axes(name).filter(|_| !faulty)
+    }
+
     /// One word per axis.
     pub fn axis_words(&self, name: &str) -> [Option<String>; 3] {
         let (key, node) = self.lookup(name);
@@ -171,14 +194,20 @@ impl<'a> Section<'a> {
         let value = match node.value {
             Value::Integer(v) => u64::try_from(v).ok(),
             // 1e5 is a float to TOML and a count to people.
-            Value::Float(v) if (0.0..=9e15).contains(&v) && libm::trunc(v) == v => Some(v as u64),
+            Value::Float(v) if (0.0..=LARGEST_WHOLE).contains(&v) && libm::trunc(v) == v => Some(v as u64),
             _ => None,
         };
-        if value.is_none_or(|v| v < min) {
-            self.mismatch(node, name, kind);
+        let Some(value) = value.filter(|value| *value >= min) else {
+            match node.value {
+                Value::Float(v) if v > LARGEST_WHOLE => {
+                    let remedy = format!("allowed: {}, at most {LARGEST_WHOLE:e}", kind.allowed());
+                    self.report(node.place.clone(), name, format!("{} is too large", node.found()), remedy);
+                }
+                _ => self.mismatch(node, name, kind),
+            }
             return None;
-        }
-        value
+        };
+        Some(value)
     }
 
     /// A whole number.

@@ -50,13 +50,14 @@ impl Decomposition {
                 "the grid {x} × {y} × {z} has an axis with no rank; give at least 1 per axis, or leave the grid out"
             ))),
             Some(product) if product <= ranks => Ok(Self { grid }),
-            _ => {
-                let product = product.map_or("far too many".to_string(), |product| product.to_string());
-                Err(Error::Layout(format!(
-                    "the grid {x} × {y} × {z} needs {product} ranks, but the program runs on {ranks}; start it with \
+            None => Err(Error::Layout(format!(
+                "the grid {x} × {y} × {z} needs more ranks than can be counted, and the program runs on {ranks}; choose a \
+                 smaller grid, or leave the grid out"
+            ))),
+            Some(product) => Err(Error::Layout(format!(
+                "the grid {x} × {y} × {z} needs {product} ranks, but the program runs on {ranks}; start it with \
                      mpirun -n {product}, choose a smaller grid, or leave the grid out"
-                )))
-            }
+            ))),
         }
     }
 

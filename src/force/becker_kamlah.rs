@@ -29,6 +29,7 @@ pub const ENTRY: LawEntry = LawEntry {
         DAMPING_NONE,
         CLIP,
     ],
+    uses: &["yield_stress"],
     check: plastic::check,
 };
 

@@ -3,7 +3,7 @@
 
 use super::registry::LawChoice;
 use super::{becker_kamlah, thornton_ning};
-use crate::config::{Config, PairConfig, Routine, Velocities};
+use crate::config::{Config, PairConfig, Routine, Velocities, idle};
 
 /// Sizes of all particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,8 @@ pub struct Sizes {
 #[must_use]
 pub fn of_run(config: &Config, sizes: Sizes) -> Vec<String> {
     let own = config.pairs.iter().flat_map(|pair| of_pair(pair, sizes));
-    let mut cautions: Vec<String> = own.chain(of_dashpots(config)).chain(config.scaled_weights()).collect();
+    let idle = idle::warnings(config);
+    let mut cautions: Vec<String> = own.chain(of_dashpots(config)).chain(config.scaled_weights()).chain(idle).collect();
     cautions.dedup();
     cautions
 }

@@ -15,6 +15,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "Hertz spring with a viscous dashpot",
     source: "W (3.1), (3.3); Tsuji et al. 1992",
     parameters: &[DAMPING_TSUJI, CLIP],
+    uses: &[],
     check: |_| Ok(()),
 };
 

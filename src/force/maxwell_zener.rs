@@ -18,6 +18,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "1 to 8 Maxwell branches beside a long-term Hertz spring, between equal materials",
     source: "W (3.7), (3.11)-(3.14) with errata",
     parameters: &[SCHEME, DAMPING_NONE, CLIP],
+    uses: &["maxwell"],
     check,
 };
 

@@ -16,6 +16,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "Mindlin increments with Coulomb friction; relaxes along with a Maxwell-Zener normal law",
     source: "W (3.4), (3.5), (3.9) with erratum",
     parameters: &[FACTOR, DAMPING],
+    uses: &[],
     check: |_| Ok(()),
 };
 

@@ -50,6 +50,8 @@ pub struct Sample {
     pub normal: [f64; 3],
     /// Overlap δ \[m\].
     pub overlap: f64,
+    /// Overlap over the smaller radius.
+    pub overlap_ratio: f64,
     /// Force on the second \[N\].
     pub force: [f64; 3],
     /// Normal force \[N\].
@@ -146,6 +148,8 @@ impl Observation {
 pub struct Observed<'a> {
     /// What to collect.
     pub wanted: Wanted,
+    /// Only samples whose overlap exceeds this share of the smaller radius.
+    pub beyond: Option<f64>,
     /// Number of owned particles.
     pub owned: usize,
     /// Number of the present contact's output line.
@@ -220,6 +224,7 @@ impl Observed<'_> {
             branch: touches.branch(lane),
             normal: touch.normal,
             overlap: touch.overlap,
+            overlap_ratio: touches.overlap_ratio(lane),
             force: scale(force, -1.0),
             normal_force: response.normal_force,
             virials,
@@ -229,7 +234,8 @@ impl Observed<'_> {
         if self.wanted.sums && sample.counted {
             self.observation.add_to_sums(&sample, &response.energies);
         }
-        if self.wanted.samples {
+        let within = self.beyond.is_some_and(|limit| sample.overlap_ratio <= limit);
+        if self.wanted.samples && !within {
             self.observation.samples.push(sample);
         }
     }

@@ -128,6 +128,9 @@ pub enum Role {
     Rolling,
 }
 
+/// Keys of `[[material]]` that only some laws read; whoever gives one without such a law is warned.
+pub const OPTIONAL_CONSTANTS: [&str; 3] = ["maxwell", "yield_stress", "surface_energy"];
+
 /// A law as the input and the documentation see it.
 #[derive(Debug, Clone, Copy)]
 pub struct LawEntry {
@@ -141,6 +144,8 @@ pub struct LawEntry {
     pub source: &'static str,
     /// Parameters in the order of [`LawChoice::values`].
     pub parameters: &'static [ParameterSpec],
+    /// Constants of materials that the law reads and others leave alone, by their keys: [`OPTIONAL_CONSTANTS`].
+    pub uses: &'static [&'static str],
     /// Checks the pair's properties; an error text says what is missing and the remedy.
     pub check: fn(&PairProperties) -> Result<(), String>,
 }

@@ -16,6 +16,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "spring-dashpot-slider against rolling and twisting",
     source: "W Sec. 1 (the four modes)",
     parameters: &[TWISTING_LIMIT, DAMPING_RATIO],
+    uses: &[],
     check: |_| Ok(()),
 };
 

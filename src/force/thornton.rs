@@ -16,6 +16,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "elastic, then perfectly plastic, with elastic unloading",
     source: "Thornton 1997; D (2)",
     parameters: &[YIELD_FACTOR, MEMORY_RANGE, DAMPING_NONE, CLIP],
+    uses: &["yield_stress"],
     check: plastic::check,
 };
 

@@ -16,6 +16,7 @@ pub const ENTRY: LawEntry = LawEntry {
     summary: "elastic, then perfectly plastic, with adhesion (Johnson-Kendall-Roberts): stick or bounce",
     source: "Thornton and Ning 1998; D (2)",
     parameters: &[YIELD_FACTOR, MEMORY_RANGE, DAMPING_NONE],
+    uses: &["yield_stress", "surface_energy"],
     check,
 };
 

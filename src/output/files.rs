@@ -13,7 +13,12 @@ pub(crate) fn io_error(path: &Path, attempt: &str, error: &io::Error) -> Error {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             "; free space on that file system or choose another output directory"
         }
-        _ => "",
+        io::ErrorKind::NotADirectory => "; a file stands where a folder is needed: choose another path",
+        io::ErrorKind::IsADirectory => "; a folder stands where a file is needed: choose another path",
+        io::ErrorKind::AlreadyExists => "; something else has that name: choose another path",
+        io::ErrorKind::ReadOnlyFilesystem => "; choose a path on a file system that can be written",
+        io::ErrorKind::InvalidData => "; the file is damaged or of another kind",
+        _ => "; look at the path and its file system, or choose another one",
     };
     Error::File { path: path.to_path_buf(), message: format!("cannot {attempt}: {error}{remedy}") }
 }

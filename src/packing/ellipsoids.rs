@@ -66,7 +66,7 @@ pub fn check_overlaps(bodies: &[Body], cell: &Cell, max_fraction: f64) -> Result
             let overlap = reach - body.position[axis].min(cell.sides[axis] - body.position[axis]);
             if overlap > max_fraction * body.smallest {
                 return Err(Error::Packing(format!(
-                    "particle {id} reaches through a wall of the {name} axis by {overlap:.4e} m, {:.4} of its smallest \
+                    "particle {id} reaches through a wall of the {name} axis by {overlap:.4e} m, {:.3e} of its smallest \
                      semi-axis, where {max_fraction} is allowed; move the particle, enlarge the cell, or make it smaller",
                     overlap / body.smallest
                 )));
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(worst.ids, [0, 1]);
         assert!((worst.fraction - 0.2).abs() < 1e-9, "{worst:?}");
         let message = check_overlaps(&[long(1.0, 5.0), long(7.1, 5.0)], &CELL, 0.1).unwrap_err().to_string();
-        assert!(message.contains("particles 0 and 1 overlap by 0.2000"), "{message}");
+        assert!(message.contains("particles 0 and 1 overlap by 2.000e-1"), "{message}");
         assert!(check_overlaps(&[long(1.0, 5.0), long(7.0, 5.0)], &CELL, 1e-9).is_ok());
     }
 

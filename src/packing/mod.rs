@@ -17,9 +17,9 @@ pub mod tournament;
 #[cfg(test)]
 mod test_input;
 
-use crate::config::{Boundary, CellConfig, Config, Motion, PackingConfig, Species};
+use crate::config::{Boundary, CellConfig, Config, MOST_DIAMETERS, Motion, PackingConfig, Species};
 use crate::error::{Error, Result};
-use crate::state::shape::{UPRIGHT, bounding_radius, ellipsoid_volume, is_sphere};
+use crate::state::shape::{UPRIGHT, bounding_radius, ellipsoid_volume, is_sphere, smallest_semi_axis};
 use crate::state::{LEDGER, ParticleState};
 use ellipsoids::Body;
 use grid::{Ball, Cell};
@@ -63,8 +63,26 @@ pub fn build(config: &Config) -> Result<Packing> {
     Ok(packing)
 }
 
+/// The particles that the input counts, with their sizes and initial velocities, before they have places.
+///
+/// # Errors
+/// As [`radii::draw_radii`].
+pub fn unplaced(config: &Config) -> Result<Vec<ParticleState>> {
+    let sized = radii::draw_radii(config.seed, &config.species)?;
+    let particles = sized.iter().enumerate();
+    Ok(particles.map(|(id, one)| at_rest_in_its_species(config, id, one.species, [0.0; 3], one.semi_axes)).collect())
+}
+
 fn check(config: &Config, packing: &Packing) -> Result<()> {
     let (particles, allowed) = (&packing.particles, config.max_overlap_fraction);
+    let smallest = particles.iter().map(|p| 2.0 * smallest_semi_axis(p.semi_axes)).fold(f64::INFINITY, f64::min);
+    let longest = packing.sides.into_iter().fold(0.0, f64::max);
+    if longest > MOST_DIAMETERS * smallest {
+        return Err(Error::Packing(format!(
+            "the longest side of the cell, {longest:e} m, is more than {MOST_DIAMETERS:e} times the smallest diameter, \
+             {smallest:e} m, and positions cannot tell what touches; look at the units of sides and radii"
+        )));
+    }
     let cell = Cell { sides: packing.sides, periodic: periodic_axes(&config.cell) };
     if particles.iter().all(|particle| is_sphere(particle.semi_axes)) {
         let ball = |particle: &ParticleState| Ball { position: particle.position, radius: particle.radius };

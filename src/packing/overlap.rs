@@ -23,7 +23,7 @@ impl Worst {
         }
         let ([low, high], fraction) = (self.ids, self.fraction);
         Err(Error::Packing(format!(
-            "particles {low} and {high} overlap by {fraction:.4} of the smaller radius, where {max_fraction} is allowed; \
+            "particles {low} and {high} overlap by {fraction:.3e} of the smaller radius, where {max_fraction} is allowed; \
              correct their positions or radii, enlarge the cell, lower `perturbation` in the section of the packing (such as \
              packing.random_close.perturbation), or raise contact.max_overlap_fraction"
         )))
@@ -93,7 +93,7 @@ pub fn check_against_faces(balls: impl Iterator<Item = (u32, Ball)>, cell: &Cell
             if overlap > max_fraction.min(1.0) * ball.radius {
                 return Err(Error::Packing(format!(
                     "particle {id} (radius {:.4e} m, {name} = {position:.4e} m) overlaps {what} by {overlap:.4e} m, \
-                     {:.4} of its radius, where {max_fraction} is allowed; enlarge the cell (side {side:.4e} m), move \
+                     {:.3e} of its radius, where {max_fraction} is allowed; enlarge the cell (side {side:.4e} m), move \
                      the particle, or make it smaller",
                     ball.radius,
                     overlap / ball.radius
@@ -120,7 +120,7 @@ mod tests {
     fn the_worst_pair_is_named_with_its_overlap() {
         let list = balls(&[([1.0; 3], 0.5), ([1.0, 1.0, 1.8], 0.5), ([5.0; 3], 1.0), ([5.0, 5.0, 6.0], 0.5)]);
         let message = check_overlaps(&list, &cube(10.0), 0.1).unwrap_err().to_string();
-        assert!(message.contains("particles 2 and 3") && message.contains("1.0000 of the smaller"), "{message}");
+        assert!(message.contains("particles 2 and 3") && message.contains("1.000e0 of the smaller"), "{message}");
         assert!(check_overlaps(&list, &cube(10.0), 1.01).is_ok());
     }
 

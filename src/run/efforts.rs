@@ -89,11 +89,30 @@ pub fn peak_bytes() -> u64 {
     status("VmHWM:")
 }
 
-/// A line of the process's status, which the system gives in kB of 1024 bytes.
+/// Memory of this machine that is free or can be made so \[B\]; `None` where the system does not say.
+#[must_use]
+pub fn available_bytes() -> Option<u64> {
+    line_of("/proc/meminfo", "MemAvailable:")
+}
+
+/// Ranks on this machine, of so many in all: as the launcher says, else all.
+#[must_use]
+pub fn ranks_here(ranks: usize) -> usize {
+    let said = ["OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"]
+        .iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
+    said.unwrap_or(ranks).max(1)
+}
+
 fn status(name: &str) -> u64 {
-    let text = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = text.lines().find_map(|line| line.strip_prefix(name));
-    line.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) * 1024
+    line_of("/proc/self/status", name).unwrap_or(0)
+}
+
+/// A line of a text of the system, which gives it in kB of 1024 bytes.
+fn line_of(path: &str, name: &str) -> Option<u64> {
+    let text = fs::read_to_string(path).ok()?;
+    let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
+    Some(rest.split_whitespace().next()?.parse::<u64>().ok()? * 1024)
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use super::efforts::{Efforts, resident_bytes};
 use super::inertia::Inertia;
-use crate::config::{self, AxisControl, Config, Interval, Routine};
+use crate::config::programme::{steps_of_all, time_of_all};
+use crate::config::{self, Config, Interval};
 use crate::error::{Error, Result};
 use crate::exchange::agree;
 use crate::force::observe::Wanted;
@@ -197,39 +198,34 @@ impl RunOutput {
     }
 }
 
-/// Share of the run that is done, as far as durations, strains, increments and steps of the stages tell.
+/// Share of the run that is done: of its time or its steps where the stages tell them all, else one stage counts like
+/// another.
 fn progress(config: &Config, global: &GlobalState) -> f64 {
-    if config.stages.iter().any(|stage| stage.routine == Routine::QuasiStatic) {
-        // There is no common measure of length: one stage counts like another.
-        let current = config.stages.get(global.stage).map_or(0.0, |stage| progress_of(stage, global));
-        return (global.stage as f64 + current) / config.stages.len() as f64;
+    let stages = &config.stages;
+    if let Some(time) = time_of_all(stages) {
+        return (global.time / time).min(1.0);
     }
-    let length = |stage: &config::Stage| {
-        let by_strain = stage.until_strain.and_then(|(axis, strain)| match stage.axes[axis] {
-            AxisControl::StrainRate(rate) if rate != 0.0 => Some((strain / rate).abs()),
-            _ => None,
-        });
-        stage.duration.or(by_strain)
-    };
-    let total: f64 = config.stages.iter().filter_map(length).sum();
-    if total > 0.0 {
-        return global.time / total;
+    if let Some(steps) = steps_of_all(stages) {
+        return (global.step as f64 / steps).min(1.0);
     }
-    let steps: u64 = config.stages.iter().filter_map(|stage| stage.steps).sum();
-    if steps > 0 { global.step as f64 / steps as f64 } else { 0.0 }
+    let current = stages.get(global.stage).map_or(0.0, |stage| progress_of(stage, global));
+    (global.stage as f64 + current) / stages.len() as f64
 }
 
 /// Share of one stage that is done: that of the end condition which is nearest.
 fn progress_of(stage: &config::Stage, global: &GlobalState) -> f64 {
+    let share = |start: f64, now: f64, target: f64| (now - start) / (target - start);
     let by_time = stage.duration.map(|duration| (global.time - global.stage_start_time) / duration);
-    let by_strain = stage.until_strain.map(|(axis, target)| {
-        let start = global.stage_start_strain[axis];
-        (global.strain[axis] - start) / (target - start)
-    });
+    let by_strain =
+        stage.until_strain.map(|(axis, target)| share(global.stage_start_strain[axis], global.strain[axis], target));
+    let by_stress = stage
+        .until_stress
+        .map(|(axis, target)| share(global.stage_start_stress[axis], global.measured_stress[axis], target));
     let by_steps = stage.steps.map(|steps| (global.step - global.stage_start_step) as f64 / steps as f64);
     let done = global.quasi_static.map_or(0, |state| state.increments - state.stage_start_increments);
     let by_increments = stage.increments.map(|increments| done as f64 / increments as f64);
-    [by_time, by_strain, by_steps, by_increments].into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0)
+    let ends = [by_time, by_strain, by_stress, by_steps, by_increments];
+    ends.into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0)
 }
 
 fn stage_times(timers: &Timers, wall: Duration) -> StageTimes {

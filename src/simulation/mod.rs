@@ -23,7 +23,7 @@ use crate::contact::list::ContactList;
 use crate::contact::section::Partners;
 use crate::contact::shift::ShiftTable;
 use crate::error::Result;
-use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan, agree};
+use crate::exchange::{Communicator, Decomposition, HaloContent, HaloPlan};
 use crate::force::geometry::CellMotion;
 use crate::force::law::Column;
 use crate::force::observe::{Observation, Wanted};
@@ -293,7 +293,7 @@ impl Simulation {
     pub fn observe(&mut self, wanted: Wanted) -> Result<Report> {
         self.prepare();
         self.update_ghosts();
-        let observation = self.observe_contacts(wanted);
+        let observation = self.observe_contacts(wanted, false);
         self.reduce(observation, wanted)
     }
 
@@ -307,7 +307,7 @@ impl Simulation {
         self.timers.start(Stage::Halo);
         self.update_ghosts();
         let observe = Wanted { sums: wanted.sums || control && self.model.needs_stress(), ..wanted };
-        let observation = self.observe_contacts(observe);
+        let observation = self.observe_contacts(observe, false);
         let mut report = self.reduce(observation, observe)?;
         if control {
             self.control(&report)?;
@@ -365,11 +365,11 @@ impl Simulation {
     }
 
     /// Look at all contacts; the ghosts are up to date.
-    fn observe_contacts(&mut self, wanted: Wanted) -> Observation {
+    fn observe_contacts(&mut self, wanted: Wanted, only_excess: bool) -> Observation {
         self.timers.start(Stage::Observe);
         let motion = self.cell_motion();
         let passes = self.model.passes_with(self.dashpots());
-        let phase = Phase { passes, input: self.pass_input(&motion, 0.0) };
+        let phase = Phase { passes, input: self.pass_input(&motion, 0.0), only_excess };
         let lines = if wanted.sums || wanted.samples { self.contacts.lines } else { 0 };
         self.forces = vec![[0.0; 4]; lines];
         let particles = &self.particles;
@@ -388,7 +388,7 @@ impl Simulation {
             workers::keep_awake();
         }
         let Self { comm, model, halo, particles, contacts, lines, reference, ghost_wraps, timers, .. } = self;
-        let phase = Phase { passes: model.passes_with(dashpots), input };
+        let phase = Phase { passes: model.passes_with(dashpots), input, only_excess: false };
         let (inner, strips) = (contacts.inner, contacts.strips.len());
         let moving = if inner == strips { particles.owned } else { contacts.strips[inner].particles.start };
         let inner_part = |particles: &mut Particles,
@@ -481,8 +481,7 @@ impl Simulation {
         self.comm.max_f64(&mut values);
         self.timers.stop();
         if values[1] != 0.0 {
-            let mine = self.describe_pass_fault(pass_fault).and_then(|()| self.describe_lost(moved.lost));
-            agree(&self.comm, mine)?;
+            self.refuse(pass_fault, moved.lost)?;
         }
         self.refresh_lists(motion, values[0])?;
         Ok(Requests { stop: values[2], checkpoint: values[3] })

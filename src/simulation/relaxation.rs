@@ -107,6 +107,7 @@ impl Simulation {
         }
         let mut report = self.observe(Wanted { sums: true, samples: false })?;
         self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        self.refuse_vain_wait(&report)?;
         let residuals = self.residuals(&report, &settings);
         let settled = block_ends && residuals.met();
         if settled {

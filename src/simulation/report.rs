@@ -246,11 +246,27 @@ impl Simulation {
         self.model.time_step.choose(measured, self.global.step).map(|_| ())
     }
 
+    /// Refuse to expand the cell for ever while a stage waits for a stress that cannot come any more.
+    pub(super) fn refuse_vain_wait(&self, report: &Report) -> Result<()> {
+        if !self.model.programme.waits_in_vain(&self.global, report.row.contacts) {
+            return Ok(());
+        }
+        Err(Error::Simulation {
+            step: self.global.step,
+            message: format!(
+                "stage {} waits for the stress of until_stress while the cell only expands, to the strain {:?} so far, and \
+                 the stress of {:?} Pa does not rise; give the stage a positive strain (compression) or another end",
+                self.global.stage, self.global.strain, self.global.measured_stress
+            ),
+        })
+    }
+
     /// Time step and servo from what was measured at a control step.
     pub(super) fn control(&mut self, report: &Report) -> Result<()> {
         if self.model.needs_stress() {
             self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
         }
+        self.refuse_vain_wait(report)?;
         let interval = self.global.time_step * self.model.config.control_interval as f64;
         let stiffness = if self.max_stiffness > self.model.time_step.reference_stiffness {
             self.max_stiffness

@@ -75,6 +75,8 @@ pub struct Phase<'a> {
     pub passes: &'a [PairPass],
     /// For the passes.
     pub input: PassInput<'a>,
+    /// Where the passes only observe: take no samples but of contacts that overlap too much.
+    pub only_excess: bool,
 }
 
 /// Strips with the sections and buffers that belong to them, to be split among threads.
@@ -283,6 +285,7 @@ impl Phase<'_> {
         }
         let mut observed = Observed {
             wanted,
+            beyond: self.only_excess.then_some(self.input.max_overlap_fraction),
             owned,
             line: 0,
             observation: Observation::new(wanted),

@@ -98,7 +98,7 @@ pub static SPECIES: Table = Table {
             ZERO,
             "Standard deviation of a random normal part of each velocity component.",
         ),
-        key("spin", axes(Dimension::RATE, false), ZERO, "Initial angular velocity."),
+        key("spin", axes(Dimension::RATE, false), ZERO, "Initial angular velocity; in rad/s, 1/s or rpm."),
     ],
 };
 
@@ -172,6 +172,6 @@ static DRIVEN: Table = Table {
     meaning: "Prescribed motion.",
     keys: &[
         key("velocity", axes(Dimension::VELOCITY, false), ZERO, "Velocity."),
-        key("spin", axes(Dimension::RATE, false), ZERO, "Angular velocity."),
+        key("spin", axes(Dimension::RATE, false), ZERO, "Angular velocity; in rad/s, 1/s or rpm."),
     ],
 };

@@ -1,6 +1,6 @@
 //! What the sheet says of quasi-static stages.
 
-use super::{Estimate, Table, contact_time, ellipsoids, quantity};
+use super::{Estimate, Limit, Meeting, Table, contact_time, ellipsoids, quantity};
 use crate::config::{AxisControl, Config, Damping, Routine, Stage};
 
 /// Stages of the quasi-static routine.
@@ -35,7 +35,8 @@ pub(super) fn rows(table: &mut Table, config: &Config, estimate: &Estimate) {
         AxisControl::Stress { .. } => most,
     });
     table.row("largest strain increment", format!("{largest:.1e}"));
-    if let Some((time, pair)) = contact_time(config, estimate.overlap.max(2.0 * largest)) {
+    let overlap = |meeting: &Meeting| estimate.overlap_of(meeting).0.max(2.0 * largest);
+    if let Some(Limit { time, pair, .. }) = contact_time(config, overlap) {
         let step = config.quasi_static_safety(ellipsoids(config)) * time;
         let text =
             format!("{} at the expected overlap, limited by {pair}; it has no physical meaning", quantity(step, "s"));

@@ -80,7 +80,8 @@ fn run(config: &PairConfig, bodies: Bodies, simd: Simd, ledger: bool) -> Left {
     let stiffness = [false, true].map(|sums| {
         let wanted = Wanted { sums, samples: false };
         let observation = Observation::new(wanted);
-        let mut observed = Observed { wanted, owned: PAIRS, line: 0, observation, forces: &mut [], first_line: 0 };
+        let mut observed =
+            Observed { wanted, beyond: None, owned: PAIRS, line: 0, observation, forces: &mut [], first_line: 0 };
         let room = (&mut *touches, &mut Vec::new());
         let bodies = BodyData { records: &records, shapes: &[] };
         pass.observe(&input, bodies, &section, 0..section.blocks(), room, &mut observed);

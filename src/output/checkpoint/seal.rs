@@ -38,7 +38,12 @@ pub(super) fn verify(comm: &Communicator, path: &Path) -> Result<()> {
     let part = own_part(comm, path).map_err(|error| fault(path, format!("cannot be read: {error}")));
     let (found_bytes, own) = agree(comm, part)?;
     if found_bytes != bytes {
-        let reason = format!("truncated: {found_bytes} bytes instead of {bytes}; use an older checkpoint");
+        let (what, remedy) = if found_bytes < bytes {
+            ("truncated", String::new())
+        } else {
+            ("too long", format!(", or cut off what was appended (truncate --size={bytes})"))
+        };
+        let reason = format!("{what}: {found_bytes} bytes instead of {bytes}; use an older checkpoint{remedy}");
         return Err(fault(path, reason));
     }
     let found = sum_over_ranks(comm, own);

@@ -14,7 +14,9 @@ pub fn read(path: &Path) -> Result<Table, String> {
         .trim(csv::Trim::All)
         .from_path(path)
         .map_err(|error| format!("cannot be read ({error}); correct the path in the input"))?;
-    let header = reader.headers().map_err(|error| format!("the header cannot be read: {error}"))?;
+    let header = reader
+        .headers()
+        .map_err(|error| format!("the header cannot be read ({error}); write the file as UTF-8 text"))?;
     let names: Vec<String> = header.iter().map(str::to_owned).collect();
     let columns = Columns::from_names(&names)?;
     let mut problems = Problems::default();
@@ -24,8 +26,13 @@ pub fn read(path: &Path) -> Result<Table, String> {
         match record {
             Ok(record) => append(&mut table, &record, &mut problems),
             Err(error) => {
-                problems.add(format!("{error}; give every line as many fields as the header has"));
-                // Text that is not UTF-8 or a failing disk would go on for ever.
+                let remedy = match error.kind() {
+                    csv::ErrorKind::UnequalLengths { .. } => "give every line as many fields as the header has",
+                    csv::ErrorKind::Utf8 { .. } => "write the file as UTF-8 text",
+                    _ => "look at the disk, or write the file again",
+                };
+                problems.add(format!("{error}; {remedy}"));
+                // A failing disk would go on for ever.
                 if error.is_io_error() {
                     break;
                 }

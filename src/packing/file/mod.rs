@@ -122,6 +122,9 @@ pub fn species_names(path: &Path) -> Result<Vec<String>> {
 }
 
 fn format(path: &Path) -> std::result::Result<Format, String> {
+    if path.is_dir() {
+        return Err("is a folder; name the particle file in it".into());
+    }
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_lowercase();
     match extension.as_str() {
         "h5" | "hdf5" => Ok(Format::Hdf5),
