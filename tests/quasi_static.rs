@@ -214,7 +214,7 @@ fn a_sphere_that_falls_is_not_in_equilibrium_until_the_floor_carries_its_weight(
     let fall = ["--set", "gravity=[0, 0, -9.81]", "--set", "cell={sides=[3e-3, 3e-3, 4e-3], boundary={z=\"walls\"}}"];
     let floor = ["--set", "cell.wall_material=hard"];
     let settled = rows(&config, &folder, &[&fall[..], &floor].concat());
-    let weight = 2500.0 * 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3) * 9.81;
+    let weight = 2500.0 * 4.0 / 3.0 * std::f64::consts::PI * RADIUS * RADIUS * RADIUS * 9.81;
     let carried = settled.last().unwrap().stress[2] * 3.0 * 3.0 * 4.0 * RADIUS * RADIUS;
     assert!((carried / weight - 1.0).abs() < 2e-3, "{carried:e} instead of {weight:e} N");
     let few = ["--set", "load.quasi_static.max_blocks=2"];
