@@ -42,10 +42,9 @@ impl LoadProgramme {
             if !is_over(stage, global) {
                 return false;
             }
-            if global.step == global.stage_start_step {
+            if global.step == global.stage_start_step || began_beyond_stress(stage, global) {
                 let (number, name) = (global.stage, &stage.name);
-                warnings
-                    .push(format!("stage {number} (\"{name}\") ended with its first state: its end was passed before"));
+                warnings.push(format!("stage {number} (\"{name}\") ended at once: its end was passed before"));
             }
             global.previous_stage = Some(StageStart {
                 time: global.stage_start_time,
@@ -201,13 +200,24 @@ fn is_over(stage: &Stage, global: &GlobalState) -> bool {
         || passed_stress(stage, global)
 }
 
-/// The stress that ends the stage is passed, from below or above.
+/// The stress that ends the stage is passed, from the side where the stage began; while the cell is only compressed a
+/// compressive one from below. Both are measured before the first step of the stage.
 fn passed_stress(stage: &Stage, global: &GlobalState) -> bool {
-    stage
-        .until_stress
-        .is_some_and(|(axis, target)| passed(global.stage_start_stress[axis], global.measured_stress[axis], target))
+    global.step > global.stage_start_step
+        && stage
+            .until_stress
+            .is_some_and(|(axis, target)| passed(global.stage_start_stress[axis], global.measured_stress[axis], target))
+        || began_beyond_stress(stage, global)
 }
 
-fn passed(start: f64, now: f64, target: f64) -> bool {
+/// A stage that only compresses the cell has begun with more than the compressive stress that ends it.
+fn began_beyond_stress(stage: &Stage, global: &GlobalState) -> bool {
+    let beyond = |(axis, target): (usize, f64)| target >= 0.0 && global.stage_start_stress[axis] > target;
+    global.step > global.stage_start_step && stage.only_compresses() && stage.until_stress.is_some_and(beyond)
+}
+
+/// A value that began on one side of the target has come to it or to the other.
+#[must_use]
+pub fn passed(start: f64, now: f64, target: f64) -> bool {
     if target >= start { now >= target } else { now <= target }
 }

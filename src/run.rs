@@ -140,7 +140,7 @@ fn from_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<
 /// The checkpoint given, or the newest of a run directory that leads to the ends of stages that the input names.
 fn fitting_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Result<(PathBuf, Checkpoint)> {
     let mut file = path.to_path_buf();
-    let mut passed_over: Option<(u64, Error)> = None;
+    let (mut passed_over, mut number): (Option<(u64, Error)>, usize) = (None, 0);
     loop {
         if path.is_dir() {
             let latest =
@@ -163,14 +163,14 @@ fn fitting_checkpoint(comm: &Communicator, config: &Config, path: &Path) -> Resu
             ))
         };
         match agree(comm, setup::compare_ends(config, &mut read))? {
-            Ends::Kept => return Ok((file, read)),
-            Ends::PutOff(changes) if path.is_dir() => {
-                if comm.rank() == 0 {
-                    eprintln!(
-                        "dem-mpi: {} is passed over, as it is too late for another end: {changes}",
-                        file.display()
-                    );
+            Ends::Kept => {
+                if number > 0 && comm.rank() == 0 {
+                    eprintln!("dem-mpi: newer checkpoints passed over, as they are too late for another end: {number}");
                 }
+                return Ok((file, read));
+            }
+            Ends::PutOff(changes) if path.is_dir() => {
+                number += 1;
                 passed_over = Some((step, refused(&changes, "no older checkpoint is left; ")));
             }
             Ends::PutOff(changes) | Ends::Changed(changes) => {

@@ -144,8 +144,8 @@ fn own_block(comm: &Communicator, total: u64) -> Range<u64> {
 pub enum Ends {
     /// It does.
     Kept,
-    /// Older checkpoints of its run do: the last stage of a complete run now ends later, or the last increment of a stage would
-    /// have been another; what has changed.
+    /// Older checkpoints of its run may: the present state lies beyond a new end, or an old one has cut its last step or increment;
+    /// what has changed.
     PutOff(String),
     /// It does not: the end of a stage that is over has changed; which.
     Changed(String),
@@ -163,7 +163,7 @@ pub fn compare_ends(config: &Config, checkpoint: &mut Checkpoint) -> Result<Ends
         return Ok(Ends::Kept);
     }
     let changes = passed.changes.join(", ");
-    if passed.increment_was_cut {
+    if passed.too_late {
         return Ok(Ends::PutOff(changes));
     }
     let programme = programme(config);

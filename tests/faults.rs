@@ -208,4 +208,17 @@ fn constants_that_no_law_reads_are_warned_of_once() {
     assert!(output.status.success(), "{}", text(&output));
     let warning = "yield_stress of the material \"hard\" has no effect";
     assert_eq!(text(&output).matches(warning).count(), 1, "{}", text(&output));
+    let config = root().join("configs/quickstart.toml");
+    let short = ["--set", "stage=[{hold=true, steps=1}]", "--set", "output.plots=false", "--set"];
+    for (damping, said) in [("none", 1), ("tsuji", 0)] {
+        let damping = format!("contact.normal.maxwell_zener.damping={damping}");
+        let output = launch(
+            &Run { config: &config, ranks: 1, threads: 1 },
+            &scratch("undamped"),
+            &[&short[..], &[&damping]].concat(),
+        );
+        assert!(output.status.success(), "{}", text(&output));
+        let warning = "restitution of the material \"PVDF\" has no effect: no normal law of its contacts has a dashpot";
+        assert_eq!(text(&output).matches(warning).count(), said, "{}", text(&output));
+    }
 }

@@ -116,6 +116,38 @@ fn a_stress_ends_a_stage_at_the_first_equilibrium_beyond_it() {
 }
 
 #[test]
+fn a_stress_is_awaited_from_the_side_on_which_its_stage_begins() {
+    // The first stage begins with stress, as the cell is shorter than the column.
+    let pressed = format!("cell.sides=[{:e}, {:e}, {:e}]", 3.0 * RADIUS, 3.0 * RADIUS, 4.0 * RADIUS * 0.995);
+    for (kind, towards, ends) in [
+        ("strain_increment = { z = -1e-4 }", "0.1 MPa", "below"),
+        ("strain_increment = { z = 1e-4 }", "0.1 MPa", "at once"),
+        ("strain_rate = { z = -100 }", "0.1 MPa", "below"),
+        ("strain_rate = { z = 100 }", "0.1 MPa", "at once"),
+    ] {
+        let folder = scratch("side");
+        let routine = if kind.contains("rate") { "routine = \"dynamic\"\n" } else { "" };
+        let config = column(
+            &folder,
+            &["hard", "soft"],
+            &format!("[[stage]]\n{routine}{kind}\nuntil_stress = {{ z = \"{towards}\" }}"),
+        );
+        let history = if routine.is_empty() { "output.history=1 increments" } else { "output.history=10 steps" };
+        let extra = ["--set", &pressed, "--set", "load.control_interval=1", "--set", history];
+        let output = go(&config, &folder, &extra);
+        assert!(output.status.success(), "{kind}: {}", text(&output));
+        let rows = history::read(&folder).unwrap();
+        let [first, .., last] = &rows[..] else { panic!("{kind}: {} rows", rows.len()) };
+        assert!(first.stress[2] > 2e5, "{kind}: {}", first.stress[2]);
+        if ends == "below" {
+            assert!(last.stress[2] <= 1e5 && last.step > 5, "{kind}: {} at {}", last.stress[2], last.step);
+        } else {
+            assert!(text(&output).contains("ended at once: its end was passed before"), "{kind}: {}", text(&output));
+        }
+    }
+}
+
+#[test]
 fn viscoelastic_contacts_answer_with_their_long_term_modulus() {
     let stage = "[[stage]]\nstrain_increment = { z = 1e-3 }\nuntil_strain = { z = 0.01 }";
     let [elastic, viscoelastic] = [false, true].map(|branches| {

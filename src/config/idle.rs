@@ -1,7 +1,7 @@
 //! What an input gives and no law of it reads.
 
 use super::contact::meets;
-use super::{Config, Material, PairConfig};
+use super::{Config, Material, PairConfig, Routine};
 use crate::force::registry::{self, OPTIONAL_CONSTANTS, Role};
 
 /// A warning for every constant of a material or of a pair that has no effect, and for every material without contacts.
@@ -12,6 +12,7 @@ pub fn warnings(config: &Config) -> Vec<String> {
         .iter()
         .filter(|pair| meets(pair.materials[0], pair.materials[1], &config.species, &config.cell))
         .collect();
+    let moves = config.stages.iter().any(|stage| stage.routine == Routine::Dynamic);
     let mut warnings = Vec::new();
     for (index, material) in config.materials.iter().enumerate() {
         let own: Vec<&&PairConfig> = met.iter().filter(|pair| pair.materials.contains(&index)).collect();
@@ -24,6 +25,13 @@ pub fn warnings(config: &Config) -> Vec<String> {
             if !own.iter().any(|pair| uses(pair, constant)) {
                 warnings.push(text(constant, &format!("the material \"{}\"", material.name)));
             }
+        }
+        if moves && material.restitution < 1.0 && !own.iter().any(|pair| pair.normal.damps()) {
+            warnings.push(format!(
+                "restitution of the material \"{}\" has no effect: no normal law of its contacts has a dashpot; give it \
+                 one (contact.normal.{}.damping = \"tsuji\"), or remove restitution",
+                material.name, own[0].normal.law.name
+            ));
         }
     }
     for pair in met {

@@ -386,7 +386,7 @@ static UNTIL_STRAIN: Table = Table {
 };
 
 static UNTIL_STRESS: Table = Table {
-    meaning: "One axis and its stress.",
+    meaning: "One axis and its stress, passed from the side on which the stage begins; while the cell is only compressed, from below.",
     keys: &[
         key("x", number(Dimension::PRESSURE, Range::ANY), Absent, "Stress of the x axis."),
         key("y", number(Dimension::PRESSURE, Range::ANY), Absent, "Stress of the y axis."),

@@ -53,6 +53,13 @@ impl Stage {
         self.axes.iter().all(|axis| matches!(axis, AxisControl::StrainRate(rate) if *rate <= 0.0))
     }
 
+    /// Whether some side of the cell becomes shorter, and none longer.
+    #[must_use]
+    pub fn only_compresses(&self) -> bool {
+        let compresses = |axis: &AxisControl| matches!(axis, AxisControl::StrainRate(rate) if *rate >= 0.0);
+        self.axes.iter().all(compresses) && !self.only_expands()
+    }
+
     /// Whether a compressive stress alone ends the stage, and no side of the cell becomes shorter.
     #[must_use]
     pub fn only_expands_towards_stress(&self) -> bool {

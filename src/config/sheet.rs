@@ -370,6 +370,7 @@ fn warnings(config: &Config, estimate: &Estimate) -> Vec<String> {
     if let (TimeStepConfig::Fixed(step), Some(automatic)) =
         (config.time_step, automatic_step(config, 0.17, |meeting| estimate.overlap_of(meeting).0.max(1e-3)))
         && step > automatic.time
+        && config.stages.iter().any(|stage| stage.routine == Routine::Dynamic)
     {
         let limit = contact_time(config, |_| 1e-3).map_or(f64::INFINITY, |limit| 2.0 * limit.time);
         warnings.push(format!(

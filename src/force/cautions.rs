@@ -35,7 +35,10 @@ fn of_dashpots(config: &Config) -> Option<String> {
         rubs && !(pair.damps() && pair.tangential.as_ref().is_some_and(LawChoice::damps))
     };
     let names = |pair: &PairConfig| pair.properties.names.clone().map(|name| format!("\"{name}\"")).join(" with ");
-    let pairs: Vec<String> = config.pairs.iter().filter(undamped).map(names).collect();
+    let mut pairs: Vec<String> = config.pairs.iter().filter(undamped).map(names).collect();
+    // Pairs that never meet are copies of one that does.
+    pairs.sort();
+    pairs.dedup();
     (!pairs.is_empty()).then(|| {
         format!(
             "{} rub without a tangential dashpot in a run that has other dashpots or quasi-static stages: where they stick they \

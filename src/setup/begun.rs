@@ -1,7 +1,12 @@
 //! What a restart cannot change: what a run begins with, and the strain of stages that have begun.
 
+mod ends;
+
 use crate::error::{Error, Result};
+use crate::load::LoadProgramme;
 use crate::state::GlobalState;
+use ends::{OF_END, need_stress, position};
+use std::cmp::Ordering;
 use toml::{Table, Value};
 
 /// Keys of a species that say how its particles begin, the material whose laws their contacts' memory belongs to, and the
@@ -10,11 +15,8 @@ const OF_SPECIES: [&str; 9] =
     ["material", "count", "radius", "semi_axes", "aspect_ratios", "velocity", "velocity_deviation", "spin", "motion"];
 /// The same of the cell, and its faces.
 const OF_CELL: [&str; 4] = ["sides", "aspect", "solid_fraction", "boundary"];
-/// Keys of a stage from which its strain follows, counted from where it began.
-const OF_STAGE: [&str; 3] = ["routine", "strain_rate", "strain_increment"];
-
-/// Keys that end a stage.
-const OF_END: [&str; 5] = ["duration", "until_strain", "until_stress", "steps", "increments"];
+/// Keys of a stage from which its strain follows, counted from where it began; without them the cell stays as it is.
+const OF_STRAIN: [&str; 2] = ["strain_rate", "strain_increment"];
 
 /// Changed ends of stages that have acted already.
 pub struct PassedEnds {
@@ -22,12 +24,13 @@ pub struct PassedEnds {
     pub changes: Vec<String>,
     /// The run was complete, and only its last stage ends otherwise.
     pub last_of_complete: bool,
-    /// No stage that is over ends otherwise, but the running one: its end has cut the increment in which it is.
-    pub increment_was_cut: bool,
+    /// The state lies beyond a new end, or the old one has cut its last step or increment, or whether the stress that now
+    /// ends the stage has been passed was not measured: only older states lead to the new ends.
+    pub too_late: bool,
 }
 
-/// Compare the ends of stages that are over, or in their last increment, with those that the checkpoint's input has, both
-/// resolved.
+/// Compare the ends of stages that are over or have begun with those that the checkpoint's input has, both resolved. That
+/// the running stage ends later, or sooner but not yet, is no change.
 ///
 /// # Errors
 /// An input cannot be read.
@@ -35,31 +38,43 @@ pub fn passed_ends(before: &str, now: &str, global: &GlobalState) -> Result<Pass
     let (before, now) = (stages(&read(before)?), stages(&read(now)?));
     let mut changes = Changes(Vec::new());
     let mut last_of_complete = global.stage == before.len();
-    for (index, ((label, old), (_, new))) in before.iter().zip(&now).enumerate().take(global.stage) {
+    for (index, (old, (_, new))) in before.iter().zip(&now).enumerate().take(global.stage) {
         let known = changes.0.len();
-        changes.of_keys(&format!("{label}."), old, new, &OF_END);
-        for key in OF_END.iter().filter(|key| !old.contains_key(**key)) {
-            if let Some(new) = new.get(*key) {
-                changes.note(format!("{label}.{key} is {new} and was not there"));
-            }
-        }
+        changes.of_ends(old, new);
         last_of_complete &= index + 1 == before.len() || changes.0.len() == known;
     }
-    let over = changes.0.len();
-    if let (Some((label, old)), 0) =
-        (before.get(global.stage).filter(|(_, old)| is_in_last_increment(old, global)), over)
-    {
-        let new = now.get(global.stage).map_or_else(Table::new, |(_, new)| new.clone());
-        changes.of_keys(&format!("{label}."), old, &new, &["until_strain"]);
+    let unmeasured = |stage: &Table| {
+        let quasi_static = ["strain_increment", "relax"].iter().any(|key| stage.contains_key(*key));
+        stage.contains_key("until_stress") && !quasi_static && !need_stress(&before)
+    };
+    if last_of_complete {
+        let too_late = !changes.0.is_empty() && now.get(before.len() - 1).is_some_and(|(_, last)| unmeasured(last));
+        return Ok(PassedEnds { last_of_complete, too_late, changes: changes.0 });
     }
-    Ok(PassedEnds { last_of_complete, increment_was_cut: changes.0.len() > over, changes: changes.0 })
+    let begun = global.step != global.stage_start_step && changes.0.is_empty();
+    let mut too_late = false;
+    if let (true, Some(old), Some((_, new))) = (begun, before.get(global.stage), now.get(global.stage)) {
+        changes.of_ends(old, new);
+        let cut = global.quasi_static.is_some_and(|_| old.1.contains_key("strain_increment"))
+            || !LoadProgramme::last_step_was_whole(global);
+        too_late = !changes.0.is_empty()
+            && (position(new, global) == Ordering::Greater
+                || unmeasured(new)
+                || cut && position(&old.1, global) != Ordering::Less);
+        if !too_late {
+            changes.0.clear();
+        }
+    }
+    Ok(PassedEnds { last_of_complete, too_late, changes: changes.0 })
 }
 
-/// The cell has the strain that ends a quasi-static stage, but no equilibrium yet.
-fn is_in_last_increment(stage: &Table, global: &GlobalState) -> bool {
-    let end = |axis: &str| stage.get("until_strain").and_then(|end| end.get(axis)).and_then(Value::as_float);
-    global.quasi_static.is_some_and(|state| state.substep > 0)
-        && ["x", "y", "z"].iter().zip(global.strain).any(|(axis, strain)| end(axis) == Some(strain))
+/// The routine of a stage of this input.
+fn routine(stage: &Table, root: &Table) -> String {
+    if ["strain_increment", "relax"].iter().any(|key| stage.contains_key(*key)) {
+        return "quasi_static".to_owned();
+    }
+    let given = stage.get("routine").or_else(|| root.get("load").and_then(|load| load.get("routine")));
+    given.and_then(Value::as_str).unwrap_or("dynamic").to_owned()
 }
 
 fn read(text: &str) -> Result<Table> {
@@ -113,7 +128,7 @@ pub fn check(before: &str, now: &str, global: &GlobalState) -> Result<bool> {
     let begun = global.stage + usize::from(global.step != global.stage_start_step);
     let (mut old, new) = (stages(&before), stages(&now));
     old.truncate(begun);
-    changes.of_lists(&old, &new, &OF_STAGE);
+    changes.of_strains(&old, &new, [&before, &now]);
     changes.of_controls(&old, &new);
     if !changes.0.is_empty() {
         return Err(changes.refused(
@@ -133,6 +148,35 @@ impl Changes {
     fn note(&mut self, line: String) {
         if !self.0.contains(&line) {
             self.0.push(line);
+        }
+    }
+
+    /// Ends of a stage that have changed, are gone or new.
+    fn of_ends(&mut self, (label, old): &(String, Table), new: &Table) {
+        self.of_keys(&format!("{label}."), old, new, &OF_END);
+        for key in OF_END.iter().filter(|key| !old.contains_key(**key)) {
+            if let Some(new) = new.get(*key) {
+                self.note(format!("{label}.{key} is {new} and was not there"));
+            }
+        }
+    }
+
+    /// Routines and strains of stages that have begun.
+    fn of_strains(&mut self, before: &[(String, Table)], now: &[(String, Table)], roots: [&Table; 2]) {
+        let none = Value::Array(vec![Value::Float(0.0); 3]);
+        for (index, (path, old)) in before.iter().enumerate() {
+            let Some((_, new)) = now.get(index) else {
+                self.note(format!("{path}, which has begun, is gone"));
+                continue;
+            };
+            for key in OF_STRAIN {
+                let [old, new] = [old, new].map(|stage| stage.get(key).unwrap_or(&none));
+                self.compare(&format!("{path}.{key}"), old, Some(new));
+            }
+            let [old, new] = [(old, roots[0]), (new, roots[1])].map(|(stage, root)| routine(stage, root));
+            if old != new {
+                self.note(format!("{path} is {new} and was {old}"));
+            }
         }
     }
 

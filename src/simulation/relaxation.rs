@@ -106,7 +106,7 @@ impl Simulation {
             return Ok(None);
         }
         let mut report = self.observe(Wanted { sums: true, samples: false })?;
-        self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        self.take_stress(&report);
         self.refuse_vain_wait(&report)?;
         let residuals = self.residuals(&report, &settings);
         let settled = block_ends && residuals.met();

@@ -246,6 +246,14 @@ impl Simulation {
         self.model.time_step.choose(measured, self.global.step).map(|_| ())
     }
 
+    /// The stress that ends stages and steers them, and the one with which a stage begins.
+    pub(super) fn take_stress(&mut self, report: &Report) {
+        self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+        if self.global.step == self.global.stage_start_step {
+            self.global.stage_start_stress = self.global.measured_stress;
+        }
+    }
+
     /// Refuse to expand the cell for ever while a stage waits for a stress that cannot come any more.
     pub(super) fn refuse_vain_wait(&self, report: &Report) -> Result<()> {
         if !self.model.programme.waits_in_vain(&self.global, report.row.contacts) {
@@ -264,7 +272,7 @@ impl Simulation {
     /// Time step and servo from what was measured at a control step.
     pub(super) fn control(&mut self, report: &Report) -> Result<()> {
         if self.model.needs_stress() {
-            self.global.measured_stress = [report.row.stress[0], report.row.stress[1], report.row.stress[2]];
+            self.take_stress(report);
         }
         self.refuse_vain_wait(report)?;
         let interval = self.global.time_step * self.model.config.control_interval as f64;

@@ -130,7 +130,7 @@ pub struct GlobalState {
     pub stage_start_strain: [f64; 3],
     /// Step at which the current stage began.
     pub stage_start_step: u64,
-    /// Measured stress when the current stage began \[Pa\].
+    /// Stress measured before the first step of the current stage \[Pa\].
     pub stage_start_stress: [f64; 3],
     /// Number of history rows written.
     pub history_rows: u64,

@@ -128,7 +128,72 @@ fn an_increment_that_a_changed_end_has_cut_is_found() {
         GlobalState { strain: [0.0, 0.0, strain], quasi_static: Some(progress), ..state(0, 7) }
     };
     let cut = passed_ends(input, &later, &within(0.0041, 5)).unwrap();
-    assert!(cut.increment_was_cut && cut.changes.join("").contains("stage.0.until_strain.z is 0.006 and was 0.0041"));
-    assert!(!passed_ends(input, input, &within(0.0041, 5)).unwrap().increment_was_cut);
-    assert!(!passed_ends(input, &later, &within(0.004, 5)).unwrap().increment_was_cut);
+    assert!(cut.too_late && cut.changes.join("").contains("stage.0.until_strain.z is 0.006 and was 0.0041"));
+    assert!(!passed_ends(input, input, &within(0.0041, 5)).unwrap().too_late);
+    assert!(!passed_ends(input, &later, &within(0.004, 5)).unwrap().too_late);
+}
+
+#[test]
+fn a_stage_that_has_begun_neither_begins_to_strain_nor_goes() {
+    let hold = "[[stage]]\nhold = true\nsteps = 9\n";
+    for (now, named) in [
+        (
+            hold.replace("hold = true", "strain_rate = [0.0, 0.0, 1.0]"),
+            "stage.0.strain_rate is [0.0, 0.0, 1.0] and was",
+        ),
+        (hold.replace("hold = true", "relax = true"), "stage.0 is quasi_static and was dynamic"),
+        (String::new(), "stage.0, which has begun, is gone"),
+    ] {
+        let message = check(hold, &now, &state(0, 7)).unwrap_err().to_string();
+        assert!(message.contains(named), "{message}");
+        assert!(check(hold, &now, &state(0, 0)).is_ok());
+    }
+    let relax = "[[stage]]\nrelax = true\n";
+    let strained = "[[stage]]\nstrain_increment = [0.0, 0.0, 1e-4]\nincrements = 3\n";
+    let message = check(relax, strained, &state(0, 7)).unwrap_err().to_string();
+    assert!(message.contains("stage.0.strain_increment"), "{message}");
+}
+
+#[test]
+fn an_end_that_lies_behind_the_state_is_too_late() {
+    // 7 steps of 0.1 s after the stage began, at a stress of 3 Pa.
+    let global = GlobalState {
+        time: 0.7,
+        previous_time: Some(0.6),
+        time_step: 0.1,
+        previous_time_step: 0.1,
+        stage_start_time: 0.0,
+        strain: [0.0, 0.0, 0.7],
+        stage_start_strain: [0.0; 3],
+        stage_start_stress: [0.0; 3],
+        measured_stress: [0.0, 0.0, 3.0],
+        ..state(0, 7)
+    };
+    let global = GlobalState { previous_time: Some(global.time - global.time_step), ..global };
+    let too_late = |old: &str, new: &str, global: &GlobalState| {
+        let input = |end: &str| format!("[[stage]]\nstrain_rate = [0.0, 0.0, 1.0]\n{end}\n");
+        passed_ends(&input(old), &input(new), global).unwrap().too_late
+    };
+    for (old, new, expected) in [
+        ("steps = 9", "steps = 8", false),
+        ("steps = 9", "steps = 7", false),
+        ("steps = 9", "steps = 6", true),
+        ("steps = 9", "duration = 0.7", false),
+        ("steps = 9", "duration = 0.6", true),
+        ("steps = 9", "until_strain = { z = 0.8 }", false),
+        ("steps = 9", "until_strain = { z = 0.6 }", true),
+        // Whether it has been passed was not measured.
+        ("steps = 9", "until_stress = { z = 5.0 }", true),
+        ("until_stress = { z = 9.0 }", "until_stress = { z = 5.0 }", false),
+        ("until_stress = { z = 9.0 }", "until_stress = { z = 2.0 }", true),
+        // The last step of the old stage was whole.
+        ("steps = 7", "steps = 9", false),
+        ("duration = 0.7", "duration = 0.9", false),
+    ] {
+        assert_eq!(too_late(old, new, &global), expected, "{new} instead of {old}");
+    }
+    // It was cut.
+    let cut = GlobalState { previous_time_step: 0.05, ..global };
+    assert!(too_late("duration = 0.7", "duration = 0.9", &cut));
+    assert!(!too_late("duration = 0.8", "duration = 0.9", &cut));
 }
