@@ -43,10 +43,7 @@ pub fn passed_ends(before: &str, now: &str, global: &GlobalState) -> Result<Pass
         changes.of_ends(old, new);
         last_of_complete &= index + 1 == before.len() || changes.0.len() == known;
     }
-    let unmeasured = |stage: &Table| {
-        let quasi_static = ["strain_increment", "relax"].iter().any(|key| stage.contains_key(*key));
-        stage.contains_key("until_stress") && !quasi_static && !need_stress(&before)
-    };
+    let unmeasured = |stage: &Table| stage.contains_key("until_stress") && !relaxes(stage) && !need_stress(&before);
     if last_of_complete {
         let too_late = !changes.0.is_empty() && now.get(before.len() - 1).is_some_and(|(_, last)| unmeasured(last));
         return Ok(PassedEnds { last_of_complete, too_late, changes: changes.0 });
@@ -68,9 +65,14 @@ pub fn passed_ends(before: &str, now: &str, global: &GlobalState) -> Result<Pass
     Ok(PassedEnds { last_of_complete, too_late, changes: changes.0 })
 }
 
+/// Keys that only quasi-static stages have.
+fn relaxes(stage: &Table) -> bool {
+    ["strain_increment", "relax"].iter().any(|key| stage.contains_key(*key))
+}
+
 /// The routine of a stage of this input.
 fn routine(stage: &Table, root: &Table) -> String {
-    if ["strain_increment", "relax"].iter().any(|key| stage.contains_key(*key)) {
+    if relaxes(stage) {
         return "quasi_static".to_owned();
     }
     let given = stage.get("routine").or_else(|| root.get("load").and_then(|load| load.get("routine")));
